@@ -1,0 +1,78 @@
+/* Lat-long environment (Mitsuba's convention): u = atan2(x, -z)/2pi with column u·W - 1/2, wrapped;
+   v = acos(y)/pi with row v·(H-1).
+
+   Sampling is piecewise constant over the cells between texel centres: marginal and conditional
+   distributions, inverted by bisection, so that stratified numbers stay stratified. */
+#ifndef CLVOL_EMITTER_ENVMAP_H
+#define CLVOL_EMITTER_ENVMAP_H
+
+/* Fractional column (in cells between texel centres, 0..W) and row (0..H-1) of a world direction. */
+INLINE float2 envmap_position(const Scene *scene, float3 direction)
+{
+    const float3 d = normalize(transform_vector(scene->envmap->env_from_world, direction));
+    const float width = (float)scene->envmap->size[0], height = (float)scene->envmap->size[1];
+    float column = atan2(d.x, -d.z) * (0.5f / PI) * width - 0.5f;
+    column -= floor(column / width) * width;
+    return (float2)(column, acos(clamp(d.y, -1.0f, 1.0f)) * (1.0f / PI) * (height - 1.0f));
+}
+
+INLINE float3 envmap_radiance(const Scene *scene, float3 direction)
+{
+    const int width = scene->envmap->size[0], height = scene->envmap->size[1];
+    const float2 p = envmap_position(scene, direction);
+    const int x0 = min((int)p.x, width - 1), y0 = min((int)p.y, height - 2);
+    const int x1 = x0 + 1 < width ? x0 + 1 : 0;
+    const float fx = p.x - (float)x0, fy = p.y - (float)y0;
+    __global const float *t = scene->env_texels;
+    const float3 a = lerp(vload3((size_t)y0 * width + x0, t), vload3((size_t)y0 * width + x1, t), fx);
+    const float3 b = lerp(vload3((size_t)(y0 + 1) * width + x0, t), vload3((size_t)(y0 + 1) * width + x1, t), fx);
+    return lerp(a, b, fy);
+}
+
+/* First index i in [0, n) with cdf[i + 1] > u; cdf has n + 1 entries from 0 to 1. */
+INLINE int cdf_search(__global const float *cdf, int n, float u)
+{
+    int lower = 0, upper = n - 1;
+    while (lower < upper) {
+        const int middle = (lower + upper) >> 1;
+        if (cdf[middle + 1] > u)
+            upper = middle;
+        else
+            lower = middle + 1;
+    }
+    return lower;
+}
+
+/* pdf in solid angle of the cell (x, y), at a sine of the polar angle. */
+INLINE float envmap_cell_pdf(const Scene *scene, int x, int y, float sine)
+{
+    const int width = scene->envmap->size[0], rows = scene->envmap->size[1] - 1;
+    __global const float *conditional = scene->env_conditional + (size_t)y * (width + 1) + x;
+    const float p = (scene->env_marginal[y + 1] - scene->env_marginal[y]) * (conditional[1] - conditional[0]);
+    return p * (float)width * (float)rows / (2.0f * PI * PI * max_of(sine, 1e-9f));
+}
+
+INLINE float envmap_pdf(const Scene *scene, float3 direction)
+{
+    const float2 p = envmap_position(scene, direction);
+    const int x = min((int)p.x, scene->envmap->size[0] - 1), y = min((int)p.y, scene->envmap->size[1] - 2);
+    return envmap_cell_pdf(scene, x, y, sin(p.y * PI / (float)(scene->envmap->size[1] - 1)));
+}
+
+INLINE float3 envmap_sample(const Scene *scene, float u, float v, float *pdf)
+{
+    const int width = scene->envmap->size[0], rows = scene->envmap->size[1] - 1;
+    const int y = cdf_search(scene->env_marginal, rows, v);
+    __global const float *conditional = scene->env_conditional + (size_t)y * (width + 1);
+    const int x = cdf_search(conditional, width, u);
+    const float fx = (u - conditional[x]) / (conditional[x + 1] - conditional[x]);
+    const float fy = (v - scene->env_marginal[y]) / (scene->env_marginal[y + 1] - scene->env_marginal[y]);
+    const float phi = ((float)x + fx + 0.5f) / (float)width * (2.0f * PI);
+    const float theta = ((float)y + fy) / (float)rows * PI;
+    const float sine = sin(theta);
+    *pdf = envmap_cell_pdf(scene, x, y, sine);
+    const float3 d = (float3)(sine * sin(phi), cos(theta), -sine * cos(phi));
+    return normalize(transform_vector(scene->envmap->world_from_env, d));
+}
+
+#endif

@@ -1,0 +1,43 @@
+/* Adds the samples of one finished pass to the film, pixel by pixel in the order of the samples, so that
+   the sums have the same bits whatever order the paths ended in.
+
+   Sums are pairs of floats (value and rounding error), 48 bits in all: float32 alone drifts after some
+   ten million samples (METHODS §7). */
+#pragma OPENCL FP_CONTRACT OFF
+
+/* sum += value, error-free (Knuth's two-sum); x: sum, y: what rounding lost. */
+INLINE float2 add_exactly(float2 sum, float value)
+{
+    const float total = sum.x + value;
+    const float part = total - sum.x;
+    const float lost = (sum.x - (total - part)) + (value - part);
+    return (float2)(total, sum.y + lost);
+}
+
+__kernel void accumulate_kernel(__global const float *results, __global const uint *result_lookups,
+                                __global float *film, __global ulong *film_lookups, __global uint *control,
+                                uint ring_pass, uint pass_jobs, uint samples, uint pixels)
+{
+    const uint pixel = get_global_id(0);
+    if (pixel >= pixels)
+        return;
+    const size_t first = (size_t)ring_pass * pass_jobs + (size_t)pixel * samples;
+    ulong lookups = 0;
+    for (uint s = 0; s < samples; ++s)
+        lookups += result_lookups[first + s];
+    film_lookups[pixel] += lookups;
+    for (uint c = 0; c < CLVOL_CHANNELS; ++c) {
+        const size_t at = (size_t)pixel * CLVOL_CHANNELS + c;
+        float4 f = vload4(at, film); /* sum, its error, sum of squares, its error */
+        for (uint s = 0; s < samples; ++s) {
+            const float x = results[(first + s) * CLVOL_CHANNELS + c];
+            if (!isfinite(x))
+                atomic_inc(control + CONTROL_NON_FINITE);
+            const float square = x * x;
+            f.xy = add_exactly(f.xy, x);
+            f.zw = add_exactly(f.zw, square);
+            f.w += fma(x, x, -square);
+        }
+        vstore4(f, at, film);
+    }
+}

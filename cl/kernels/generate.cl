@@ -1,0 +1,16 @@
+/* From: GENERATE
+   To: INTERSECT (a new path), SHADE (idle: no job left)
+   Reads: the finished path, the job counter.
+   Writes: results, every field of a new path. */
+#include "stages/generate.h"
+
+__kernel __attribute__((reqd_work_group_size(CLVOL_LOCAL_SIZE, 1, 1))) void generate_kernel(CLVOL_ARGUMENTS)
+{
+    const Scene scene = CLVOL_SCENE;
+    const uint group = get_group_id(0);
+    const uint count = *queue_counter(&scene, group, QUEUE_GENERATE);
+    __global const uint *slots = queue_entries(&scene, group, QUEUE_GENERATE);
+    for (uint i = get_local_id(0); i < count; i += CLVOL_LOCAL_SIZE)
+        generate(&scene, group, slots[i]);
+    queue_clear(&scene, group, QUEUE_GENERATE);
+}

@@ -1,0 +1,16 @@
+/* From: MEDIUM
+   To: SHADE (collision or escape), INTERSECT (more media may follow)
+   Reads: ray, interval, majorants, volumes.
+   Writes: collision point or event, look-ups. */
+#include "stages/medium_sample.h"
+
+__kernel __attribute__((reqd_work_group_size(CLVOL_LOCAL_SIZE, 1, 1))) void medium_sample_kernel(CLVOL_ARGUMENTS)
+{
+    const Scene scene = CLVOL_SCENE;
+    const uint group = get_group_id(0);
+    const uint count = *queue_counter(&scene, group, QUEUE_MEDIUM);
+    __global const uint *slots = queue_entries(&scene, group, QUEUE_MEDIUM);
+    for (uint i = get_local_id(0); i < count; i += CLVOL_LOCAL_SIZE)
+        medium_sample(&scene, group, slots[i]);
+    queue_clear(&scene, group, QUEUE_MEDIUM);
+}

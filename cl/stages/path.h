@@ -1,0 +1,119 @@
+/* Path slots and queues: how stages hand paths to each other.
+
+   A work-group owns CLVOL_GROUP_SLOTS slots and its own part of every queue, so that groups never
+   wait for each other.  A queue holds slot numbers; its order is not defined and nothing depends on it. */
+#ifndef CLVOL_STAGES_PATH_H
+#define CLVOL_STAGES_PATH_H
+
+#define NO_JOB 0xFFFFFFFFu
+
+INLINE __global uint *queue_counter(const Scene *scene, uint group, uint queue)
+{
+    return scene->counts + group * COUNTER_STRIDE + queue;
+}
+
+INLINE __global uint *queue_entries(const Scene *scene, uint group, uint queue)
+{
+    return scene->queues + (group * QUEUE_COUNT + queue) * CLVOL_GROUP_SLOTS;
+}
+
+INLINE void queue_push(const Scene *scene, uint group, uint queue, uint slot)
+{
+    const uint place = atomic_inc(queue_counter(scene, group, queue));
+    queue_entries(scene, group, queue)[place] = slot;
+}
+
+/* Empties a queue once the whole group has read its length and entries; nobody pushes to the queue
+   that its own stage reads. */
+INLINE void queue_clear(const Scene *scene, uint group, uint queue)
+{
+    barrier(CLK_GLOBAL_MEM_FENCE);
+    if (get_local_id(0) == 0)
+        *queue_counter(scene, group, queue) = 0;
+}
+
+INLINE SampleKey path_key(const Scene *scene, uint slot)
+{
+    SampleKey key;
+    key.pixel = path_pixel(scene, slot);
+    key.sample = path_sample(scene, slot);
+    key.bounce = path_bounce(scene, slot);
+    return key;
+}
+
+INLINE uint2 render_seed(const Scene *scene)
+{
+    return (uint2)(scene->render->seed[0], scene->render->seed[1]);
+}
+
+INLINE Ray path_ray(const Scene *scene, uint slot)
+{
+    Ray ray;
+    ray.o = (float3)(path_origin_x(scene, slot), path_origin_y(scene, slot), path_origin_z(scene, slot));
+    ray.d = (float3)(path_direction_x(scene, slot), path_direction_y(scene, slot), path_direction_z(scene, slot));
+    return ray;
+}
+
+INLINE void set_path_origin(const Scene *scene, uint slot, float3 o)
+{
+    set_path_origin_x(scene, slot, o.x);
+    set_path_origin_y(scene, slot, o.y);
+    set_path_origin_z(scene, slot, o.z);
+}
+
+INLINE void set_path_direction(const Scene *scene, uint slot, float3 d)
+{
+    set_path_direction_x(scene, slot, d.x);
+    set_path_direction_y(scene, slot, d.y);
+    set_path_direction_z(scene, slot, d.z);
+}
+
+INLINE uint path_channel_or_zero(const Scene *scene, uint slot)
+{
+#if CLVOL_ONE_CHANNEL_PER_PATH
+    return path_channel(scene, slot);
+#else
+    return 0;
+#endif
+}
+
+#if CLVOL_HAS_HETEROGENEOUS
+INLINE void record_tally(const Scene *scene, uint slot, Tally tally)
+{
+    set_path_lookups(scene, slot, path_lookups(scene, slot) + tally.lookups);
+    if (tally.violations > 0)
+        set_path_violations(scene, slot, path_violations(scene, slot) + tally.violations);
+    if (tally.exhausted > 0)
+        set_path_exhausted(scene, slot, path_exhausted(scene, slot) + tally.exhausted);
+}
+#endif
+
+INLINE float3 load_vector(__global const float *v)
+{
+    return (float3)(v[0], v[1], v[2]);
+}
+
+#if CLVOL_SPECTRUM == 1
+#define CLVOL_SPECTRUM_FIELD(name) \
+    INLINE Spectrum get_##name(const Scene *scene, uint slot) { return path_##name##_0(scene, slot); } \
+    INLINE void set_##name(const Scene *scene, uint slot, Spectrum s) { set_path_##name##_0(scene, slot, s); }
+#else
+#define CLVOL_SPECTRUM_FIELD(name) \
+    INLINE Spectrum get_##name(const Scene *scene, uint slot) \
+    { \
+        return (Spectrum)(path_##name##_0(scene, slot), path_##name##_1(scene, slot), path_##name##_2(scene, slot)); \
+    } \
+    INLINE void set_##name(const Scene *scene, uint slot, Spectrum s) \
+    { \
+        set_path_##name##_0(scene, slot, s.x); \
+        set_path_##name##_1(scene, slot, s.y); \
+        set_path_##name##_2(scene, slot, s.z); \
+    }
+#endif
+CLVOL_SPECTRUM_FIELD(beta)
+CLVOL_SPECTRUM_FIELD(radiance)
+#if CLVOL_NEE
+CLVOL_SPECTRUM_FIELD(shadow)
+#endif
+
+#endif

@@ -1,0 +1,161 @@
+/* Handles what happened to a path: it escaped to the environment, or collided in a medium.
+
+   A collision is absorbed or scattered; a scattering draws one next-event ray and the next direction.
+   The directional densities of phase function and light sampling are weighted by the power heuristic
+   (METHODS §6). */
+#ifndef CLVOL_STAGES_SHADE_H
+#define CLVOL_STAGES_SHADE_H
+
+INLINE void shade_escape(const Scene *scene, uint slot)
+{
+#if CLVOL_HAS_CONSTANT || CLVOL_HAS_ENVMAP
+    if (CLVOL_HIDE_EMITTERS && path_bounce(scene, slot) == 0)
+        return;
+#if CLVOL_HAS_MAX_DEPTH
+    if (scene->render->max_depth == 0)
+        return;
+#endif
+    float light_pdf;
+    const float3 rgb = environment(scene, path_ray(scene, slot).d, &light_pdf);
+    Spectrum radiance = get_beta(scene, slot) * to_spectrum(rgb, path_channel_or_zero(scene, slot));
+#if CLVOL_MIS
+    const float pdf = path_pdf(scene, slot);
+    if (pdf > 0.0f)
+        radiance *= mis_weight(pdf, light_pdf);
+#endif
+    set_radiance(scene, slot, get_radiance(scene, slot) + radiance);
+#endif
+}
+
+/* Single-scattering albedo of `medium` at world point p. */
+INLINE Spectrum medium_albedo(const Scene *scene, uint slot, __global const Medium *medium, float3 p)
+{
+    const uint channel = path_channel_or_zero(scene, slot);
+#if CLVOL_HAS_ALBEDO_VOLUME
+    if (medium->albedo_volume >= 0) {
+        __global const Volume *volume = scene->volumes + medium->albedo_volume;
+        const float3 at = transform_point(volume->world_to_index, p);
+        if (volume->channels == 1)
+            return (Spectrum)(volume_value(scene, volume, at, 0));
+#if CLVOL_SPECTRUM == 3
+        return (Spectrum)(volume_value(scene, volume, at, 0), volume_value(scene, volume, at, 1),
+                          volume_value(scene, volume, at, 2));
+#else
+        return volume_value(scene, volume, at, (int)channel);
+#endif
+    }
+#endif
+    return to_spectrum((float3)(medium->albedo[0], medium->albedo[1], medium->albedo[2]), channel);
+}
+
+#if CLVOL_HAS_SCATTERING
+/* Next-event estimation: queues a shadow ray towards one light. */
+INLINE void next_event(const Scene *scene, uint group, uint slot, SampleKey key, __global const Medium *medium,
+                              float3 p, float3 wo, Spectrum beta)
+{
+#if CLVOL_NEE
+    if (!medium->sample_emitters)
+        return;
+    const uint4 k = decision_block(render_seed(scene), key, BLOCK_LIGHT, 0);
+    const LightSample light =
+        sample_light(scene, p, uniform_below_one(k.x), uniform_below_one(k.y), uniform_below_one(k.z));
+    const float pdf = phase_pdf(medium, wo, light.direction);
+    const float weight = light.pdf > 0.0f ? mis_weight(light.pdf, pdf) : 1.0f;
+    const Spectrum value = beta * to_spectrum(light.value, path_channel_or_zero(scene, slot)) * (pdf * weight);
+    if (!(spectrum_max(value) > 0.0f))
+        return;
+    set_path_shadow_x(scene, slot, light.direction.x);
+    set_path_shadow_y(scene, slot, light.direction.y);
+    set_path_shadow_z(scene, slot, light.direction.z);
+#if CLVOL_HAS_POINT
+    set_path_shadow_distance(scene, slot, light.distance);
+#endif
+    set_shadow(scene, slot, value);
+    queue_push(scene, group, QUEUE_SHADOW, slot);
+#endif
+}
+
+/* The path goes on from p; returns false when it ends there. */
+INLINE bool scatter(const Scene *scene, uint group, uint slot, SampleKey key, __global const Medium *medium,
+                           Spectrum beta)
+{
+    key.bounce += 1;
+#if CLVOL_HAS_MAX_DEPTH
+    if (key.bounce >= scene->render->max_depth) {
+        set_path_cut(scene, slot, path_cut(scene, slot) + 1);
+        set_path_cut_energy(scene, slot, path_cut_energy(scene, slot) + spectrum_mean(beta));
+        return false;
+    }
+#endif
+    set_path_bounce(scene, slot, key.bounce); /* also numbers the shadow ray's random numbers */
+    const Ray ray = path_ray(scene, slot);
+    next_event(scene, group, slot, key, medium, ray.o, ray.d, beta);
+    const uint4 k = decision_block(render_seed(scene), key, BLOCK_DIRECTION, 0);
+    if (key.bounce > scene->render->rr_depth) {
+        const float survival = min_of(1.0f, spectrum_max(beta));
+        if (!(uniform_float(k.z) < survival))
+            return false;
+        beta /= survival;
+    }
+    float pdf;
+    const float3 wi = phase_sample(medium, ray.d, uniform_below_one(k.x), uniform_below_one(k.y), &pdf);
+#if CLVOL_MIS
+    set_path_pdf(scene, slot, medium->sample_emitters ? pdf : 0.0f);
+#endif
+    set_path_direction(scene, slot, wi);
+    set_beta(scene, slot, beta);
+#if CLVOL_HAS_MANY_MEDIA
+    set_path_interval(scene, slot, 0);
+#endif
+#if CLVOL_HAS_OVERLAP
+    set_path_hit_medium(scene, slot, -1);
+#endif
+    return true;
+}
+#endif
+
+/* Returns false when the path ends at the collision. */
+INLINE bool shade_collision(const Scene *scene, uint group, uint slot)
+{
+#if CLVOL_HAS_SCATTERING
+    const SampleKey key = path_key(scene, slot);
+#if CLVOL_HAS_MANY_MEDIA
+    __global const Medium *medium = scene->media + path_medium(scene, slot);
+    const uint interval = path_interval(scene, slot);
+#else
+    __global const Medium *medium = scene->media;
+    const uint interval = 0;
+#endif
+    const Spectrum albedo = medium_albedo(scene, slot, medium, path_ray(scene, slot).o);
+    Spectrum beta = get_beta(scene, slot);
+#if CLVOL_ABSORPTION_BY_WEIGHT
+    beta *= albedo;
+    if (!(spectrum_max(beta) > 0.0f))
+        return false;
+#else
+    /* Analog: P_s = sigma_s / sigma_t, the same for every channel the path carries. */
+    const float scattering = spectrum_max(albedo);
+    const uint4 k = decision_block(render_seed(scene), key, BLOCK_WALK, interval);
+    if (!choose_event(k.y, scattering, 1.0f - scattering))
+        return false;
+#endif
+    return scatter(scene, group, slot, key, medium, beta);
+#else
+    return false;
+#endif
+}
+
+INLINE void shade(const Scene *scene, uint group, uint slot)
+{
+    const uint event = path_event(scene, slot);
+    bool goes_on = false;
+    if (event == EVENT_ESCAPE)
+        shade_escape(scene, slot);
+#if CLVOL_HAS_MEDIA
+    else if (event == EVENT_COLLISION)
+        goes_on = shade_collision(scene, group, slot);
+#endif
+    queue_push(scene, group, goes_on ? QUEUE_INTERSECT : QUEUE_GENERATE, slot);
+}
+
+#endif

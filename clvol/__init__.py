@@ -1,0 +1,40 @@
+"""clvol: an OpenCL wavefront renderer for participating media.
+
+    import clvol
+    scene = clvol.load_file("scene.xml", spp=64)
+    clvol.render(scene, technique="delta").save("out.exr")
+
+Names are imported when first used, so that `import clvol` and `clvol --help` stay quick.
+"""
+
+from importlib import import_module
+
+from clvol.version import __version__
+
+_EXPORTS = {
+    "Error": "clvol.errors",
+    "load_dict": "clvol.scene",
+    "load_file": "clvol.scene",
+    "look_at": "clvol.scene",
+    "merge": "clvol.result",
+    "render": "clvol.renderer",
+    "Result": "clvol.result",
+    "rotate": "clvol.scene",
+    "scale": "clvol.scene",
+    "Scene": "clvol.scene.records",
+    "translate": "clvol.scene",
+}
+
+__all__ = ["__version__", *_EXPORTS]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _EXPORTS:
+        raise AttributeError(f"module 'clvol' has no attribute {name!r}")
+    value = getattr(import_module(_EXPORTS[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

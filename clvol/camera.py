@@ -1,0 +1,62 @@
+"""The perspective camera as the device needs it: rays that are affine in the pixel position.
+
+Everything is worked out in double.  Rays do not start at the pinhole but on the plane that lies just
+before the scene's bounding sphere (or the near plane): a float position there keeps its precision
+however far away the camera stands.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from clvol.scene.records import Film, Perspective
+
+
+@dataclass(frozen=True, eq=False)
+class CameraRays:
+    """Ray of film position (x, y) in pixels: origin = position + x dx + y dy (relative to the scene's
+    centre), direction ∝ base + x base_dx + y base_dy.  `far`: depth of the far plane beyond the origins."""
+
+    position: np.ndarray
+    dx: np.ndarray
+    dy: np.ndarray
+    base: np.ndarray
+    base_dx: np.ndarray
+    base_dy: np.ndarray
+    forward: np.ndarray
+    far: float
+
+
+def field_of_view_x(sensor: Perspective, film: Film) -> float:
+    """Horizontal field of view in radians, from a field of view along any axis."""
+    aspect = film.width / film.height
+    axis = sensor.fov_axis
+    if axis == "smaller":
+        axis = "x" if film.width <= film.height else "y"
+    elif axis == "larger":
+        axis = "x" if film.width >= film.height else "y"
+    tangent = math.tan(math.radians(sensor.fov) / 2)
+    if axis == "y":
+        tangent *= aspect
+    elif axis == "diagonal":
+        tangent *= aspect / math.hypot(aspect, 1.0)
+    return 2 * math.atan(tangent)
+
+
+def camera_rays(sensor: Perspective, film: Film, centre: np.ndarray, radius: float) -> CameraRays:
+    """Rays of `sensor`, relative to `centre`; `radius` bounds everything they can hit (world units)."""
+    tangent = math.tan(field_of_view_x(sensor, film) / 2)
+    linear, eye = sensor.to_world[:3, :3], sensor.to_world[:3, 3] - centre
+    offset_x, offset_y = sensor.principal_point_offset
+    # local +x is the image's left, local +y its top
+    per_pixel = 2 * tangent / film.width
+    corner = np.array([tangent * (1 + 2 * offset_x), tangent * film.height / film.width + 2 * tangent * offset_y, 1.0])
+    base, dx, dy = linear @ corner, linear @ [-per_pixel, 0, 0], linear @ [0, -per_pixel, 0]
+    forward = linear[:, 2] / np.linalg.norm(linear[:, 2])
+    unit = float(base @ forward)  # depth of a ray at parameter 1; the same for every pixel
+    depth = max(sensor.near_clip * unit, float(-eye @ forward) - radius)
+    start = depth / unit
+    return CameraRays(eye + start * base, start * dx, start * dy, base, dx, dy, forward, sensor.far_clip * unit - depth)

@@ -1,0 +1,222 @@
+"""The `clvol` command: render, info, devices.  Heavy modules are imported where they are used."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from clvol.cli_options import (
+    INTERRUPTED,
+    Definition,
+    ExplainedCommand,
+    OneLineErrors,
+    choice_option,
+    finite,
+)
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from clvol.result import Result
+
+RENDER_EXAMPLES = """
+\b
+Examples:
+  clvol render scenes/fire.xml -o fire.exr
+  clvol render scenes/cloud.xml -o cloud.exr -o cloud.png --spp 256
+  clvol render scenes/cloud.xml -o cloud.exr --time 20 -v
+  clvol render scenes/cloud.xml -o cloud.exr -D res=512 --majorant global
+"""
+
+GROUP_EXAMPLES = """
+\b
+Examples:
+  clvol render scenes/fire.xml -o fire.exr
+  clvol info scenes/fire.vdb
+  clvol devices
+"""
+
+
+definitions_option = click.option(
+    "-D",
+    "definitions",
+    type=Definition(),
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Fill $NAME in the scene.",
+)
+
+
+@click.group(
+    "clvol",
+    cls=OneLineErrors,
+    invoke_without_command=True,
+    epilog=GROUP_EXAMPLES,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+@click.version_option(package_name="clvol", message="clvol %(version)s")
+@click.pass_context
+def main(ctx: click.Context) -> None:
+    """Render participating media with OpenCL."""
+    if ctx.invoked_subcommand is None:
+        click.echo(ctx.get_help())
+
+
+@main.command(cls=ExplainedCommand, epilog=RENDER_EXAMPLES)
+@click.argument("scene", metavar="SCENE")
+@click.option(
+    "-o",
+    "--output",
+    "outputs",
+    metavar="FILE",
+    multiple=True,
+    required=True,
+    help="Picture to write, .exr or .png; may be given several times.",
+)
+@choice_option("technique", "How collisions are sampled.")
+@choice_option("transmittance", "How transmittance is estimated.")
+@choice_option("majorant", "What bounds the extinction.")
+@choice_option("lookup", "How the density is looked up.")
+@choice_option("absorption", "How absorption is treated.")
+@click.option("--spp", type=click.IntRange(min=1), help="Samples per pixel; the scene's own by default.")
+@click.option(
+    "--time",
+    "time_limit",
+    type=click.FloatRange(min=0, min_open=True),
+    callback=finite,
+    metavar="SECONDS",
+    help="Render for so long instead.",
+)
+@click.option("--seed", type=click.IntRange(min=0), help="Same seed, same bits; the scene's own by default.")
+@click.option("--device", metavar="PATTERN", help="Part of the device's name; see clvol devices.")
+@definitions_option
+@click.option(
+    "--exposure",
+    type=float,
+    default=0.0,
+    callback=finite,
+    metavar="STOPS",
+    help="Brighten a .png by so many stops.",
+)
+@click.option("-v", "--verbose", is_flag=True, help="Print features, built units, memory and time by stage.")
+@click.option("--quiet", is_flag=True, help="No progress bar and no summary.")
+def render(
+    scene: str,
+    outputs: tuple[str, ...],
+    spp: int | None,
+    time_limit: float | None,
+    definitions: tuple[tuple[str, str], ...],
+    exposure: float,
+    verbose: bool,
+    quiet: bool,
+    **options: Any,
+) -> None:
+    """Render SCENE, a Mitsuba 3 XML file, into one or more pictures.
+
+    Ctrl-C ends the render early and keeps the picture so far.
+    """
+    from rich.console import Console
+
+    from clvol import image_io
+    from clvol.progress import RichProgress
+
+    if spp is not None and time_limit is not None:
+        raise click.UsageError("give --spp or --time, not both")
+    for output in outputs:
+        image_io.check_output(output)
+    console = Console(stderr=True)
+    with _logging_to(console, verbose):
+        import clvol
+
+        loaded = clvol.load_file(scene, **dict(definitions))
+        with nullcontext(False) if quiet else RichProgress(console) as progress:
+            result = clvol.render(loaded, spp=spp, time_limit=time_limit, progress=progress, **options)
+        for output in outputs:
+            result.save(output, exposure=exposure)
+    interrupted = bool(result.stats.get("interrupted"))
+    if interrupted:
+        click.echo(f"clvol: interrupted after {result.samples[1]} spp, saved what there is", err=True)
+    if not quiet:
+        click.echo("\n".join(_summary(result, outputs)))
+    click.get_current_context().exit(INTERRUPTED if interrupted else 0)
+
+
+@contextmanager
+def _logging_to(console: Console, verbose: bool) -> Iterator[None]:
+    """Print clvol's log on the console, beside a progress bar too: warnings, and the plan with `verbose`."""
+
+    class ConsoleHandler(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            prefix = f"clvol: {record.levelname.lower()}: " if record.levelno >= logging.WARNING else ""
+            console.print(
+                prefix + self.format(record), markup=False, highlight=False, emoji=False, soft_wrap=True
+            )
+
+    logger, handler = logging.getLogger("clvol"), ConsoleHandler()
+    earlier = logger.level
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO if verbose else logging.WARNING)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(earlier)
+
+
+def _summary(result: Result, outputs: tuple[str, ...]) -> Iterator[str]:
+    """What was written, what it cost and how sure it is."""
+    from clvol.progress import format_noise
+
+    height, width = result.image.shape[:2]
+    about, count = result.metadata, result.samples[1]
+    seconds = about["seconds"]
+    rate = width * height * count / max(seconds, 1e-9)
+    yield f"{', '.join(outputs)}: {width} x {height} pixels, {count} spp"
+    yield f"  {seconds:.2f} s, {rate:,.0f} samples/s, noise {format_noise(result.noise)}"
+    choices = ("technique", "transmittance", "majorant", "lookup")
+    chosen = ", ".join(f"{key} {about[key]}" for key in choices)
+    lookups = result.stats["lookups"] / max(result.stats["paths"], 1)
+    yield f"  {chosen}; {lookups:.4g} look-ups per path"
+
+
+@main.command()
+@click.argument("file", metavar="FILE")
+@click.option("--grid", metavar="NAME", help="Only this grid of a .vdb, or this array of a .npz.")
+@definitions_option
+def info(file: str, grid: str | None, definitions: tuple[tuple[str, str], ...]) -> None:
+    """Say what a volume or a scene contains.
+
+    FILE is a volume (.vdb, .vol, .npy, .npz): its grids, sizes, boxes, values and memory; or a scene
+    (.xml): its camera, film, media and lights.
+    """
+    from clvol import describe
+
+    if Path(file).suffix.lower() == ".xml":
+        import clvol
+
+        lines = describe.describe_scene(clvol.load_file(file, **dict(definitions)))
+    else:
+        lines = describe.describe_volume(file, grid)
+    click.echo("\n".join(lines))
+
+
+@main.command()
+def devices() -> None:
+    """List the OpenCL devices; the first is used unless --device names another."""
+    from clvol import describe
+    from clvol.device import list_devices
+
+    for device in list_devices():
+        memory = describe.format_bytes(device.global_memory)
+        click.echo(f"{device.index}: {device.name}")
+        click.echo(f"   {device.platform}, {device.version}")
+        click.echo(f"   {device.kind}, {device.compute_units} compute units, {memory}")
+
+
+if __name__ == "__main__":
+    main()

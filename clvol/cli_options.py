@@ -1,0 +1,124 @@
+"""What clvol's commands share: one-line errors, and option types that read the registry."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+import click
+
+from clvol.errors import DeviceError, Error, OptionError
+
+USER_ERROR = 2
+INTERRUPTED = 130
+
+
+class OneLineErrors(click.Group):
+    """A command group whose users' mistakes end in one line on standard error and status 2, no traceback."""
+
+    def main(
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = None,
+        complete_var: str | None = None,
+        standalone_mode: bool = True,
+        **extra: Any,
+    ) -> Any:
+        """Run the command as `click.Group.main` does, and exit; without `standalone_mode`, return."""
+        if not standalone_mode:
+            return super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
+        try:
+            status = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
+        except click.UsageError as error:
+            fail(_usage_message(error))
+        except click.ClickException as error:
+            fail(error.format_message())
+        except DeviceError as error:
+            fail(str(error), whole=True)
+        except Error as error:
+            fail(str(error))
+        except OSError as error:
+            fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
+        except MemoryError as error:
+            fail(f"out of memory: {error}" if str(error) else "out of memory")
+        except click.Abort:
+            click.echo("clvol: interrupted, nothing was written", err=True)
+            sys.exit(INTERRUPTED)
+        sys.exit(status if isinstance(status, int) else 0)
+
+
+def fail(message: str, whole: bool = False) -> NoReturn:
+    """Print one line on standard error, or the `whole` text (a build log), and exit with status 2."""
+    click.echo(f"clvol: error: {message if whole else ' '.join(message.split())}", err=True)
+    sys.exit(USER_ERROR)
+
+
+def _usage_message(error: click.UsageError) -> str:
+    message = error.format_message().rstrip(".")
+    command = error.ctx.command_path if error.ctx else "clvol"
+    return f"{message[:1].lower()}{message[1:]}; see {command} --help"
+
+
+class RegistryChoice(click.ParamType):
+    """A name of one family of `clvol.registry`, or "auto"; the registry is read when it is needed."""
+
+    def __init__(self, family: str) -> None:
+        self.name = family
+
+    def entries(self) -> dict[str, Any]:
+        """The family's table: name to an object with a one-line `summary`."""
+        from clvol.registry import FAMILIES
+
+        return FAMILIES[self.name]
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        """The choices as they stand in --help."""
+        return f"[{'|'.join(['auto', *self.entries()])}]"
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """The value itself if it is known; OptionError with the known ones if not."""
+        from clvol.registry import check_choice
+
+        return check_choice(self.name, value)
+
+
+class Definition(click.ParamType):
+    """A `name=value` pair that fills a scene's <default>."""
+
+    name = "name=value"
+
+    def convert(
+        self, value: str, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, str]:
+        """Split at the first "="; OptionError where there is none or nothing stands before it."""
+        name, equals, text = value.partition("=")
+        if not (equals and name.isidentifier()):
+            raise OptionError(f"-D takes name=value, not '{value}'", hint="for example -D res=256")
+        return name, text
+
+
+def finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
+    """Callback of a number option: refuse nan and infinity."""
+    if value is not None and not math.isfinite(value):
+        raise click.BadParameter("must be a finite number", ctx=ctx, param=param)
+    return value
+
+
+def choice_option(family: str, text: str) -> Any:
+    """An option `--family` that takes a name of the registry's family; "auto" by default."""
+    return click.option(f"--{family}", type=RegistryChoice(family), default="auto", help=text)
+
+
+class ExplainedCommand(click.Command):
+    """A command whose --help ends with what the choices of each `RegistryChoice` mean, then its epilog."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write a section for each option that takes a name of the registry."""
+        for parameter in self.params:
+            if isinstance(parameter.type, RegistryChoice):
+                entries = parameter.type.entries()
+                with formatter.section(parameter.opts[0]):
+                    formatter.write_dl([(name, entry.summary) for name, entry in entries.items()])
+        super().format_epilog(ctx, formatter)

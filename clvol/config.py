@@ -1,0 +1,244 @@
+"""What a scene uses (Features) and what is compiled for it (KernelConfig).
+
+Both are plain values: everything that decides which code is built is here and nowhere else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from clvol.scene import records
+
+
+def _is_grey(volume: records.Volume) -> bool:
+    if isinstance(volume, records.ConstVolume):
+        return len(set(volume.value)) == 1
+    return channels_of(volume) == 1
+
+
+def channels_of(volume: records.GridVolume) -> int:
+    """Channels of a grid volume: 1 or 3."""
+    return getattr(volume.grid, "values", np.empty(1)).shape[-1] if hasattr(volume.grid, "values") else 1
+
+
+@dataclass(frozen=True)
+class Features:
+    """What a scene contains, as far as it decides which code, buffers and stages are needed."""
+
+    media: int = 0
+    volumes: int = 0
+    homogeneous: bool = False
+    heterogeneous: bool = False
+    clipped: bool = False
+    media_overlap: bool = False
+    chromatic_extinction: bool = False
+    chromatic_albedo: bool = False
+    chromatic_light: bool = False
+    albedo_volumes: bool = False
+    trilinear: bool = False
+    nearest: bool = False
+    cubes: bool = False
+    spheres: bool = False
+    isotropic: bool = False
+    hg: bool = False
+    scattering: bool = False
+    emitters: int = 0
+    constant: bool = False
+    envmap: bool = False
+    directional: bool = False
+    point_lights: bool = False
+    samples_lights: bool = False
+    filter_table: bool = False
+    depth_limited: bool = False
+    hide_emitters: bool = False
+
+    @classmethod
+    def from_scene(cls, scene: records.Scene) -> Features:
+        """Inspect a scene; the result is a pure function of the records."""
+        media = scene_media(scene)
+        volumes = [v for m in media for v in medium_volumes(m)]
+        emitters = scene.emitters
+        homogeneous = [is_homogeneous(m) for m in media]
+        kinds = {type(e) for e in emitters}
+        grey_light = all(_emitter_is_grey(e) for e in emitters)
+        shapes = [s for s in scene.shapes if s.interior is not None]
+        return cls(
+            media=len(media),
+            volumes=len(volumes),
+            homogeneous=any(homogeneous),
+            heterogeneous=not all(homogeneous),
+            clipped=any(is_clipped(m) for m in media),
+            media_overlap=_may_overlap(shapes),
+            chromatic_extinction=any(not _is_grey(m.sigma_t) for m in media),
+            chromatic_albedo=any(not _is_grey(m.albedo) for m in media),
+            chromatic_light=not grey_light,
+            albedo_volumes=any(isinstance(m.albedo, records.GridVolume) for m in media),
+            trilinear=any(v.filter_type == "trilinear" for v in volumes),
+            nearest=any(v.filter_type == "nearest" for v in volumes),
+            cubes=any(s.kind == "cube" for s in shapes),
+            spheres=any(s.kind == "sphere" for s in shapes),
+            isotropic=any(m.phase.kind == "isotropic" for m in media),
+            hg=any(m.phase.kind == "hg" for m in media),
+            scattering=any(_scatters(m) for m in media),
+            emitters=len(emitters),
+            constant=records.ConstantEmitter in kinds,
+            envmap=records.EnvmapEmitter in kinds,
+            directional=records.DirectionalEmitter in kinds,
+            point_lights=records.PointEmitter in kinds,
+            samples_lights=bool(emitters) and any(m.sample_emitters for m in media),
+            filter_table=scene.film.rfilter.kind != "box",
+            depth_limited=scene.integrator.max_depth >= 0,
+            hide_emitters=scene.integrator.hide_emitters,
+        )
+
+    def found(self) -> str:
+        """One line that names what is there, for the log."""
+        return ", ".join(
+            name if value is True else f"{name} {value}" for name, value in asdict(self).items() if value
+        )
+
+
+@dataclass(frozen=True)
+class KernelConfig:
+    """Everything that decides which kernels are composed: features plus the user's choices."""
+
+    features: Features
+    technique: str = "delta"
+    transmittance: str = "ratio"
+    majorant: str = "grid"  # "none" where no medium needs one
+    lookup: str = "exact"
+    absorption: str = "sample"
+    local_size: int = 1
+    group_slots: int = 256
+
+    @property
+    def channels(self) -> int:
+        """Channels of the image: 1 when every coefficient and light is grey, else 3."""
+        f = self.features
+        return 3 if f.chromatic_extinction or f.chromatic_albedo or f.chromatic_light else 1
+
+    @property
+    def one_channel_per_path(self) -> bool:
+        """Analog tracking of chromatic media follows one channel, chosen per path (METHODS §3, delta)."""
+        f = self.features
+        return f.chromatic_extinction or (f.chromatic_albedo and self.absorption == "sample")
+
+    @property
+    def spectrum(self) -> int:
+        """Floats that a path's weight holds."""
+        return 1 if self.one_channel_per_path else self.channels
+
+    @property
+    def nee(self) -> bool:
+        """Next-event estimation: there are lights to sample and media that scatter towards them."""
+        return self.features.samples_lights and self.features.scattering
+
+    @property
+    def mis(self) -> bool:
+        """Both ways of finding an environment are in use, so that they must be weighted."""
+        return self.nee and (self.features.constant or self.features.envmap)
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """Kernels of one wave, in launch order."""
+        stages = ["generate", "intersect"]
+        if self.features.media:
+            stages.append("medium_sample")
+        stages.append("shade")
+        if self.nee:
+            stages.append("shadow_transmittance")
+        return tuple(stages)
+
+    def defines(self) -> dict[str, int]:
+        """``CLVOL_*`` macros of the composed units; every value is an integer."""
+        f = self.features
+        return {
+            "CLVOL_LOCAL_SIZE": self.local_size,
+            "CLVOL_GROUP_SLOTS": self.group_slots,
+            "CLVOL_CHANNELS": self.channels,
+            "CLVOL_SPECTRUM": self.spectrum,
+            "CLVOL_ONE_CHANNEL_PER_PATH": int(self.one_channel_per_path),
+            "CLVOL_HAS_MEDIA": int(f.media > 0),
+            "CLVOL_HAS_MANY_MEDIA": int(f.media > 1),
+            "CLVOL_HAS_OVERLAP": int(f.media_overlap),
+            "CLVOL_HAS_HOMOGENEOUS": int(f.homogeneous),
+            "CLVOL_HAS_HETEROGENEOUS": int(f.heterogeneous),
+            "CLVOL_HAS_CLIPPED": int(f.clipped),
+            "CLVOL_HAS_CUBE": int(f.cubes),
+            "CLVOL_HAS_SPHERE": int(f.spheres),
+            "CLVOL_HAS_TRILINEAR": int(f.trilinear),
+            "CLVOL_HAS_NEAREST": int(f.nearest),
+            "CLVOL_HAS_ALBEDO_VOLUME": int(f.albedo_volumes),
+            "CLVOL_HAS_ISOTROPIC": int(f.isotropic),
+            "CLVOL_HAS_HG": int(f.hg),
+            "CLVOL_HAS_SCATTERING": int(f.scattering),
+            "CLVOL_HAS_CONSTANT": int(f.constant),
+            "CLVOL_HAS_ENVMAP": int(f.envmap),
+            "CLVOL_HAS_DIRECTIONAL": int(f.directional),
+            "CLVOL_HAS_POINT": int(f.point_lights),
+            "CLVOL_HAS_FILTER_TABLE": int(f.filter_table),
+            "CLVOL_HAS_MAX_DEPTH": int(f.depth_limited),
+            "CLVOL_HIDE_EMITTERS": int(f.hide_emitters),
+            "CLVOL_NEE": int(self.nee),
+            "CLVOL_MIS": int(self.mis),
+            "CLVOL_ABSORPTION_BY_WEIGHT": int(self.absorption == "weight"),
+        }
+
+
+def scene_media(scene: records.Scene) -> list[records.Medium]:
+    """Media of the scene, one per bounding shape, in the order of the shapes."""
+    return [shape.interior for shape in scene.shapes if shape.interior is not None]
+
+
+def medium_volumes(medium: records.Medium) -> list[records.GridVolume]:
+    """Grid volumes of a medium: sigma_t first, then albedo."""
+    return [v for v in (medium.sigma_t, medium.albedo) if isinstance(v, records.GridVolume)]
+
+
+def is_homogeneous(medium: records.Medium) -> bool:
+    """Whether sigma_t is the same everywhere inside (the albedo may still vary)."""
+    return isinstance(medium.sigma_t, records.ConstVolume)
+
+
+def is_clipped(medium: records.Medium) -> bool:
+    """Whether the box of the sigma_t volume bounds the medium beside its shape."""
+    if medium.homogeneous:
+        return False
+    return not isinstance(medium.sigma_t, records.GridVolume) or medium.sigma_t.clipped
+
+
+def _scatters(medium: records.Medium) -> bool:
+    return not isinstance(medium.albedo, records.ConstVolume) or any(a > 0 for a in medium.albedo.value)
+
+
+def _emitter_is_grey(emitter: records.Emitter) -> bool:
+    if isinstance(emitter, records.EnvmapEmitter):
+        r = emitter.radiance
+        return bool((r[..., 0] == r[..., 1]).all() and (r[..., 0] == r[..., 2]).all())
+    value = {
+        records.ConstantEmitter: "radiance",
+        records.DirectionalEmitter: "irradiance",
+        records.PointEmitter: "intensity",
+    }[type(emitter)]
+    return len(set(getattr(emitter, value))) == 1
+
+
+def shape_bounds(shape: records.Shape) -> tuple[np.ndarray, np.ndarray]:
+    """Axis-aligned world bounds (lower, upper) of a cube or sphere, float64 (3,)."""
+    linear, centre = shape.to_world[:3, :3], shape.to_world[:3, 3]
+    if shape.kind == "sphere":
+        extent = np.sqrt((linear**2).sum(axis=1))
+    else:
+        extent = np.abs(linear).sum(axis=1)
+    return centre - extent, centre + extent
+
+
+def _may_overlap(shapes: list[records.Shape]) -> bool:
+    """Conservative: whether the world boxes of any two medium bounds intersect."""
+    if len(shapes) < 2:
+        return False
+    lower, upper = (np.array(b) for b in zip(*(shape_bounds(s) for s in shapes), strict=True))
+    meet = ((lower[:, None] < upper[None]) & (upper[:, None] > lower[None])).all(axis=2)
+    return bool(np.triu(meet, 1).any())

@@ -1,0 +1,171 @@
+"""What a volume or a scene contains, in lines of text: the answers of `clvol info`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from clvol.scene import records
+from clvol.volumes import VdbGridInfo, list_vdb, read_volume
+from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
+from clvol.volumes.vdb import VALUE_TYPES
+
+
+def format_bytes(count: float) -> str:
+    """Number of bytes as "512 B", "1.5 MiB", …"""
+    for unit in ("B", "KiB", "MiB", "GiB"):
+        if count < 1024 or unit == "GiB":
+            break
+        count /= 1024
+    return f"{count:.4g} {unit}"
+
+
+def describe_volume(path: str, grid: str | None = None) -> list[str]:
+    """Every grid of a volume file, or the one named; VolumeError where the file cannot be read."""
+    if grid is not None or Path(path).suffix.lower() != ".vdb":
+        return describe_grid(read_volume(path, grid))
+    return [line for stored in list_vdb(path) for line in _vdb_lines(path, stored)]
+
+
+def _vdb_lines(path: str, stored: VdbGridInfo) -> Iterator[str]:
+    readable = stored.value_type in VALUE_TYPES and stored.index_to_world is not None
+    if readable:
+        yield from describe_grid(read_volume(path, stored.name))
+    else:
+        yield f"{stored.name}: cannot be rendered"
+    precision = " in half precision" if stored.half else ""
+    compression = ", ".join(stored.compression) or "no compression"
+    yield f"  stored   {stored.value_type}{precision}, {compression}, {stored.transform}"
+
+
+def describe_grid(grid: Grid) -> list[str]:
+    """Name, size, box, value range, sum and memory of one grid; a line each."""
+    return list(_dense_lines(grid) if isinstance(grid, DenseGrid) else _sparse_lines(grid))
+
+
+def _dense_lines(grid: DenseGrid) -> Iterator[str]:
+    depth, height, width, channels = grid.values.shape
+    plural = "s" if channels > 1 else ""
+    yield f"{grid.name or 'grid'}: dense, {width} x {height} x {depth} samples, {channels} channel{plural}"
+    yield f"  box      {_box(grid.box)}"
+    yield f"  values   {_number(grid.values.min())} to {_number(grid.values.max())}"
+    yield f"  sum      {_number(grid.values.sum(dtype=np.float64))}"
+    yield f"  memory   {format_bytes(grid.values.nbytes)}"
+
+
+def _sparse_lines(grid: SparseGrid) -> Iterator[str]:
+    lower, upper = grid.active_box
+    size = upper - lower + 1
+    share = grid.active_voxels / max(int(size.astype(np.int64).prod()), 1)
+    low, high, total = active_statistics(grid)
+    stored = (grid.leaf_origins, grid.leaf_values, grid.leaf_active, grid.tile_origins, grid.tile_values)
+    yield f"{grid.name}: sparse, {size[0]} x {size[1]} x {size[2]} samples in the active box"
+    yield f"  box      {_box(grid.active_box)} (index)"
+    yield f"           {_box(_world_box(grid))} (world)"
+    yield (
+        f"  active   {grid.active_voxels:,} voxels, {100 * share:.3g} % of the box; "
+        f"{len(grid.leaf_origins):,} leaves, {int(grid.tile_active.sum()):,} active tiles"
+    )
+    yield f"  values   {_number(low)} to {_number(high)}, background {_number(grid.background)}"
+    yield f"  sum      {_number(total)}"
+    yield f"  memory   {format_bytes(sum(array.nbytes for array in stored))}"
+
+
+def active_statistics(grid: SparseGrid) -> tuple[float, float, float]:
+    """Minimum, maximum and sum of the active samples; nan, nan, 0 where there are none.
+
+    A tile counts with all its samples.  The mask's bit order is OpenVDB's, x slowest, while the values
+    lie z slowest.
+    """
+    bits = np.unpackbits(grid.leaf_active, axis=1, bitorder="little").astype(bool)
+    active = bits.reshape(-1, 8, 8, 8).transpose(0, 3, 2, 1)
+    voxels = grid.leaf_values[active]
+    tiles = grid.tile_values[grid.tile_active]
+    tile_samples = grid.tile_sizes[grid.tile_active].astype(np.float64) ** 3
+    values = np.concatenate([voxels, tiles])
+    if values.size == 0:
+        return np.nan, np.nan, 0.0
+    total = voxels.sum(dtype=np.float64) + (tiles * tile_samples).sum()
+    return float(values.min()), float(values.max()), float(total)
+
+
+def _world_box(grid: SparseGrid) -> np.ndarray:
+    """Axis-aligned world box (2, 3) around the positions of the active samples."""
+    lower, upper = grid.active_box.astype(np.float64)
+    corners = np.array([np.where([i & 1, i & 2, i & 4], upper, lower) for i in range(8)])
+    world = corners @ grid.index_to_world[:3, :3].T + grid.index_to_world[:3, 3]
+    return np.stack([world.min(axis=0), world.max(axis=0)])
+
+
+def describe_scene(scene: records.Scene) -> list[str]:
+    """Camera, film, integrator, media and lights of a scene; a line or two each."""
+    return list(_scene_lines(scene))
+
+
+def _scene_lines(scene: records.Scene) -> Iterator[str]:
+    film, integrator = scene.film, scene.integrator
+    position = scene.sensor.to_world[:3, 3]
+    yield f"camera   perspective at {_point(position)}, field of view {_number(scene.sensor.fov)} degrees"
+    yield f"film     {film.width} x {film.height} pixels, {film.rfilter.kind} filter, {scene.spp} spp"
+    depth = "unlimited" if integrator.max_depth < 0 else str(integrator.max_depth)
+    choices = "".join(f", {key} {value}" for key, value in integrator.choices.items())
+    yield f"paths    max_depth {depth}, rr_depth {integrator.rr_depth}{choices}"
+    for shape in scene.shapes:
+        yield f"shape    {shape.kind}{f' {shape.name!r}' if shape.name else ''}, {_medium(shape.interior)}"
+    for emitter in scene.emitters:
+        yield f"light    {_emitter(emitter)}"
+
+
+def _medium(medium: records.Medium | None) -> str:
+    if medium is None:
+        return "empty"
+    phase = medium.phase.kind + (f" (g {_number(medium.phase.g)})" if medium.phase.kind == "hg" else "")
+    return (
+        f"{'homogeneous' if medium.homogeneous else 'heterogeneous'} medium: "
+        f"sigma_t {_volume(medium.sigma_t)} times {_number(medium.scale)}, "
+        f"albedo {_volume(medium.albedo)}, phase {phase}"
+    )
+
+
+def _volume(volume: records.Volume) -> str:
+    if isinstance(volume, records.ConstVolume):
+        return _spectrum(volume.value)
+    grid = volume.grid
+    if isinstance(grid, DenseGrid):
+        size = "x".join(str(count) for count in grid.values.shape[2::-1])
+    else:
+        size = "x".join(str(count) for count in grid.active_box[1] - grid.active_box[0] + 1)
+    return f"{volume.source or grid.name or 'grid'} ({size})"
+
+
+def _emitter(emitter: records.Emitter) -> str:
+    match emitter:
+        case records.ConstantEmitter():
+            return f"constant, radiance {_spectrum(emitter.radiance)}"
+        case records.EnvmapEmitter():
+            height, width = emitter.radiance.shape[:2]
+            return f"envmap {emitter.source} ({width} x {height})"
+        case records.DirectionalEmitter():
+            return (
+                f"directional, irradiance {_spectrum(emitter.irradiance)}, along {_point(emitter.direction)}"
+            )
+        case records.PointEmitter():
+            return f"point, intensity {_spectrum(emitter.intensity)}, at {_point(emitter.position)}"
+
+
+def _box(box: np.ndarray) -> str:
+    return f"{_point(box[0])} to {_point(box[1])}"
+
+
+def _point(values: np.ndarray | tuple[float, ...]) -> str:
+    return f"({', '.join(_number(value) for value in values)})"
+
+
+def _spectrum(values: tuple[float, ...]) -> str:
+    return _number(values[0]) if len(values) == 1 else _point(values)
+
+
+def _number(value: float) -> str:
+    return f"{float(value):.7g}"

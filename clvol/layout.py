@@ -1,0 +1,253 @@
+"""What the device sees: every record, path-state field, queue and kernel argument, described once.
+
+Python dtypes and the OpenCL text are both made from the tables here; a test compares sizes and
+offsets on the device.  No value of a scene belongs here, only its shape.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from clvol.config import KernelConfig
+
+_C_TYPES = {"f": "float", "i": "int", "u": "uint"}
+
+
+def _record(*fields: tuple[str, str, int]) -> np.dtype:
+    """A dtype of 4-byte scalars and small arrays, so that C and NumPy agree without padding rules."""
+    return np.dtype(
+        [(name, f"{kind}4", (count,)) if count > 1 else (name, f"{kind}4") for name, kind, count in fields]
+    )
+
+
+VOLUME = _record(
+    ("world_to_index", "f", 12),  # 3x4 rows; sample (i, j, k) sits at index position (i, j, k)
+    ("size", "i", 3),  # samples per axis, at least 2
+    ("channels", "i", 1),
+    ("bricks", "i", 3),  # top grid: bricks of 8³ cells per axis
+    ("top_offset", "i", 1),  # first entry in `tops`
+    ("brick_offset", "u", 1),  # first brick in `bricks`, in units of 729 floats
+    ("nearest", "i", 1),  # 1: nearest sample, 0: trilinear
+)
+
+MEDIUM = _record(
+    ("shape_from_world", "f", 12),
+    ("shape_kind", "i", 1),  # SHAPE_CUBE, SHAPE_SPHERE
+    ("homogeneous", "i", 1),
+    ("clipped", "i", 1),  # 1: also bounded by box_lower..box_upper under box_from_world
+    ("box_from_world", "f", 12),
+    ("box_lower", "f", 3),
+    ("box_upper", "f", 3),
+    ("sigma_t", "f", 3),  # homogeneous: the coefficient; heterogeneous: multiplies the volume
+    ("albedo", "f", 3),  # used where albedo_volume < 0
+    ("sigma_t_volume", "i", 1),
+    ("albedo_volume", "i", 1),
+    ("phase_kind", "i", 1),  # PHASE_ISOTROPIC, PHASE_HG
+    ("phase_g", "f", 1),
+    ("sample_emitters", "i", 1),
+    ("majorant", "f", 1),  # global bound of sigma_t
+    ("cells", "i", 3),  # majorant cells per axis
+    ("cell_offset", "i", 1),  # first entry in `majorants`
+    ("cell_size", "f", 1),  # edge of a majorant cell in index units
+    ("kd_root", "i", 1),  # first entry in `kd_nodes`
+)
+
+EMITTER = _record(
+    ("kind", "i", 1),  # EMITTER_CONSTANT, …
+    ("select_pdf", "f", 1),  # probability that next-event estimation picks it
+    ("value", "f", 3),  # radiance, irradiance or intensity
+    ("vector", "f", 3),  # direction of travel, or position
+)
+
+ENVMAP = _record(
+    ("env_from_world", "f", 12),
+    ("world_from_env", "f", 12),
+    ("size", "i", 2),  # width, height in texels
+)
+
+RENDER = _record(
+    ("film_size", "i", 2),
+    ("seed", "u", 2),
+    ("first_sample", "u", 1),
+    ("pass_samples", "u", 1),  # samples per pixel in a full pass
+    ("pass_jobs", "u", 1),  # jobs in a full pass
+    ("ring_passes", "u", 1),  # passes that may be in flight together
+    ("last_pass", "u", 1),  # index of the pass of last_samples samples
+    ("last_samples", "u", 1),
+    ("max_depth", "u", 1),
+    ("rr_depth", "u", 1),
+    ("emitters", "u", 1),
+    ("media", "u", 1),
+    ("filter_radius", "f", 1),
+    ("filter_bins", "i", 1),
+    ("sample_border", "i", 1),
+    ("camera_position", "f", 3),  # pixel (0, 0)'s corner on the plane rays start from
+    ("camera_dx", "f", 3),  # one pixel to the right, on that plane
+    ("camera_dy", "f", 3),
+    ("camera_base", "f", 3),  # direction through pixel (0, 0)'s corner, not normalised
+    ("camera_base_dx", "f", 3),
+    ("camera_base_dy", "f", 3),
+    ("camera_forward", "f", 3),
+    ("camera_far", "f", 1),  # depth of the far plane beyond the plane rays start from
+)
+
+RECORDS = {
+    "Volume": VOLUME,
+    "Medium": MEDIUM,
+    "Emitter": EMITTER,
+    "Envmap": ENVMAP,
+    "Render": RENDER,
+}
+
+ENUMS = {
+    "SHAPE": ("CUBE", "SPHERE"),
+    "PHASE": ("ISOTROPIC", "HG"),
+    "EMITTER": ("CONSTANT", "ENVMAP", "DIRECTIONAL", "POINT"),
+    "QUEUE": ("GENERATE", "INTERSECT", "MEDIUM", "SHADE", "SHADOW"),
+    "EVENT": ("IDLE", "ESCAPE", "COLLISION"),
+    "CONTROL": ("NEXT_JOB", "JOB_LIMIT", "NON_FINITE", "DONE"),  # DONE: one counter per pass in the ring
+}
+COUNTER_STRIDE = 16  # queue counters of a group, padded to a cache line
+
+
+def enum(family: str, name: str) -> int:
+    """Device constant ``FAMILY_NAME``."""
+    return ENUMS[family].index(name.upper())
+
+
+@dataclass(frozen=True)
+class PathField:
+    """One 4-byte field of a path slot: its C type, what it holds, and whether this scene needs it."""
+
+    name: str
+    kind: str
+    meaning: str
+    needed: bool = True
+
+
+def path_fields(config: KernelConfig) -> list[PathField]:
+    """The fields that a slot holds for `config`, in order (4 bytes each)."""
+    features = config.features
+    spectrum = range(config.spectrum)
+    fields = [
+        PathField("origin_x", "f", "start of the ray, world space"),
+        PathField("origin_y", "f", "start of the ray, world space"),
+        PathField("origin_z", "f", "start of the ray, world space"),
+        PathField("direction_x", "f", "unit direction of travel"),
+        PathField("direction_y", "f", "unit direction of travel"),
+        PathField("direction_z", "f", "unit direction of travel"),
+        *(PathField(f"beta_{c}", "f", "path weight") for c in spectrum),
+        *(PathField(f"radiance_{c}", "f", "radiance gathered so far") for c in spectrum),
+        PathField("pixel", "u", "pixel index y * width + x"),
+        PathField("sample", "u", "sample index within the pixel"),
+        PathField("job", "u", "where in `results` the path ends up; NO_JOB: the slot is empty"),
+        PathField("bounce", "u", "scatterings so far"),
+        PathField("event", "u", "what shade has to handle: EVENT_*"),
+        PathField("lookups", "u", "density look-ups so far"),
+        PathField("channel", "u", "the one channel this path follows", config.one_channel_per_path),
+        PathField("pdf", "f", "density of the last direction; 0 where MIS does not apply", config.mis),
+        PathField("medium", "i", "medium of the current interval", features.media > 1),
+        PathField("interval", "u", "walks done since the last scattering", features.media > 1),
+        PathField("entry", "f", "where the current interval was entered", features.media > 1),
+        PathField("interval_start", "f", "ray parameter where the walk starts", features.media > 1),
+        PathField("interval_end", "f", "ray parameter where the walk ends", features.media > 0),
+        PathField("hit_medium", "i", "medium of the nearest collision so far, or -1", features.media_overlap),
+        PathField("hit_distance", "f", "ray parameter of that collision", features.media_overlap),
+        PathField("shadow_x", "f", "direction to the light", config.nee),
+        PathField("shadow_y", "f", "direction to the light", config.nee),
+        PathField("shadow_z", "f", "direction to the light", config.nee),
+        PathField("shadow_distance", "f", "distance to the light", config.nee and features.point_lights),
+        *(
+            PathField(f"shadow_{c}", "f", "unattenuated light of next-event estimation", config.nee)
+            for c in spectrum
+        ),
+        PathField(
+            "violations", "u", "statistics of the slot: look-ups above their majorant", features.heterogeneous
+        ),
+        PathField("cut", "u", "statistics of the slot: paths ended by max_depth", features.depth_limited),
+        PathField("cut_energy", "f", "statistics of the slot: weight of those paths", features.depth_limited),
+        PathField(
+            "exhausted", "u", "statistics of the slot: walks ended by the loop bound", features.heterogeneous
+        ),
+    ]
+    return [field for field in fields if field.needed]
+
+
+SLOT_STATISTICS = ("violations", "cut", "cut_energy", "exhausted")
+
+
+@dataclass(frozen=True)
+class Argument:
+    """One kernel argument: a buffer (or scalar) that this scene needs."""
+
+    name: str
+    c_type: str
+    needed: bool = True
+
+    @property
+    def is_pointer(self) -> bool:
+        return self.c_type.startswith("__global")
+
+
+def arguments(config: KernelConfig) -> list[Argument]:
+    """Arguments of every stage kernel, in order: state and queues first, then what the scene holds."""
+    features = config.features
+    table = [
+        Argument("render", "__global const Render *"),
+        Argument("state", "__global uint *"),
+        Argument("slot_stride", "uint"),
+        Argument("queues", "__global uint *"),
+        Argument("counts", "__global uint *"),
+        Argument("control", "__global uint *"),
+        Argument("results", "__global float *"),
+        Argument("result_lookups", "__global uint *"),
+        Argument("media", "__global const Medium *", features.media > 0),
+        Argument("volumes", "__global const Volume *", features.volumes > 0),
+        Argument("tops", "__global const int *", features.volumes > 0),
+        Argument("bricks", "__global const float *", features.volumes > 0),
+        Argument("majorants", "__global const float *", config.majorant == "grid"),
+        Argument("kd_nodes", "__global const uint2 *", config.majorant == "kdtree"),
+        Argument("emitters", "__global const Emitter *", features.emitters > 0),
+        Argument("envmap", "__global const Envmap *", features.envmap),
+        Argument("env_texels", "__global const float *", features.envmap),
+        Argument("env_marginal", "__global const float *", features.envmap),
+        Argument("env_conditional", "__global const float *", features.envmap),
+        Argument("filter_cdf", "__global const float *", features.filter_table),
+    ]
+    return [argument for argument in table if argument.needed]
+
+
+def record_text(name: str, dtype: np.dtype) -> str:
+    """C struct of a record dtype."""
+    lines = []
+    for field in dtype.names:
+        base, shape = dtype[field].base, dtype[field].shape
+        suffix = f"[{shape[0]}]" if shape else ""
+        lines.append(f"    {_C_TYPES[base.kind]} {field}{suffix};")
+    return "typedef struct {\n" + "\n".join(lines) + f"\n}} {name};"
+
+
+def layout_text(config: KernelConfig) -> str:
+    """OpenCL text of every record, enum, path-state accessor and the stage argument list."""
+    parts = [record_text(name, dtype) for name, dtype in RECORDS.items()]
+    for family, names in ENUMS.items():
+        parts += [f"#define {family}_{name} {value}" for value, name in enumerate(names)]
+    parts += [f"#define QUEUE_COUNT {len(ENUMS['QUEUE'])}", f"#define COUNTER_STRIDE {COUNTER_STRIDE}u"]
+    args = arguments(config)
+    parts.append("typedef struct {\n" + "\n".join(f"    {a.c_type} {a.name};" for a in args) + "\n} Scene;")
+    parts.append("#define CLVOL_ARGUMENTS " + ", ".join(f"{a.c_type} {a.name}_" for a in args))
+    parts.append("#define CLVOL_SCENE {" + ", ".join(f"{a.name}_" for a in args) + "}")
+    for index, field in enumerate(path_fields(config)):
+        at = f"scene->state[{index}u * scene->slot_stride + slot]"
+        get, put = (f"as_float({at})", "as_uint(value)") if field.kind == "f" else (at, "(uint)(value)")
+        if field.kind == "i":
+            get = f"(int){at}"
+        c_type = _C_TYPES[field.kind]
+        parts.append(
+            f"/* {field.meaning} */\n"
+            f"INLINE {c_type} path_{field.name}(const Scene *scene, uint slot) {{ return {get}; }}\n"
+            f"INLINE void set_path_{field.name}(const Scene *scene, uint slot, {c_type} value) {{ {at} = {put}; }}"
+        )
+    return "\n".join(parts) + "\n"

@@ -1,0 +1,109 @@
+"""From a KernelConfig to bound kernels: composes one translation unit per stage and builds it.
+
+Units are written out in full (includes expanded, `#line` kept), so that a dump is self-contained, no
+include path reaches the compiler, and drivers' caches see exactly what is compiled.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import cache
+from importlib import resources
+
+import pyopencl as cl
+
+from clvol import layout, registry
+from clvol.config import KernelConfig
+from clvol.device import Device
+from clvol.errors import DeviceError
+
+_INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"')
+BUILD_OPTIONS = ("-cl-std=CL1.2",)
+"""No relaxed-math flag: they may delete the checks for NaN and infinity (METHODS §7)."""
+
+
+@cache
+def kernel_source(name: str) -> str:
+    """Text of the file `name` under cl/, which is installed as clvol/_cl; a checkout has it beside clvol/."""
+    package = resources.files("clvol")
+    installed = package.joinpath("_cl")
+    folder = installed if installed.is_dir() else package.joinpath("..", "cl")
+    return folder.joinpath(name).read_text(encoding="utf-8")
+
+
+def _expand(name: str, seen: set[str]) -> Iterator[str]:
+    """Lines of a file with its includes in place, each file once."""
+    if name in seen:
+        return
+    seen.add(name)
+    yield f'#line 1 "{name}"'
+    for number, line in enumerate(kernel_source(name).splitlines(), 1):
+        match = _INCLUDE.match(line)
+        if match:
+            yield from _expand(match[1], seen)
+            yield f'#line {number + 1} "{name}"'
+        else:
+            yield line
+
+
+def _headers(config: KernelConfig, stage: str) -> list[str]:
+    """Headers that a stage of this configuration needs, in order."""
+    features = config.features
+    walks = stage in ("medium_sample", "shadow_transmittance")
+    reads_volumes = (walks and features.heterogeneous) or (stage == "shade" and features.albedo_volumes)
+    headers = []
+    if reads_volumes:
+        headers.append("density/volume.h")
+    headers.append("tracking/interface.h")
+    if walks and features.heterogeneous:
+        headers.append(registry.MAJORANTS[config.majorant].header)
+        family = registry.TECHNIQUES[config.technique] if stage == "medium_sample" else None
+        headers.append((family or registry.TRANSMITTANCES[config.transmittance]).header)
+    if walks and features.homogeneous:
+        headers.append("tracking/homogeneous.h")
+    if stage == "shade":
+        if features.scattering:
+            headers.append("phase/phase.h")
+        headers.append("emitter/emitter.h")
+    if stage in ("intersect", "shadow_transmittance") and features.media:
+        headers.append("geometry/interval.h")
+    return headers
+
+
+def compose(config: KernelConfig, headers: list[str], body: str) -> str:
+    """A translation unit: defines, layout, `headers`, then `body` (OpenCL text)."""
+    seen: set[str] = set()
+    lines = ["/* Composed by clvol. */"]
+    lines += [f"#define {name} {value}" for name, value in config.defines().items()]
+    for name in ("core/types.h", "core/random.h"):
+        lines += _expand(name, seen)
+    lines += ['#line 1 "layout"', *layout.layout_text(config).splitlines()]
+    for name in headers:
+        lines += _expand(name, seen)
+    for line in body.splitlines():
+        match = _INCLUDE.match(line)
+        lines += _expand(match[1], seen) if match else [line]
+    return "\n".join(lines) + "\n"
+
+
+def stage_source(config: KernelConfig, stage: str) -> str:
+    """The composed source of one stage kernel, or of `accumulate`."""
+    headers = [] if stage == "accumulate" else [*_headers(config, stage), "stages/path.h"]
+    return compose(config, headers, f'#include "kernels/{stage}.cl"\n')
+
+
+def build(device: Device, source: str, name: str) -> cl.Program:
+    """Build a unit; a failing build raises DeviceError with the log, which names file and line."""
+    program = cl.Program(device.context, source)
+    try:
+        return program.build(options=list(BUILD_OPTIONS))
+    except cl.RuntimeError as error:
+        log = program.get_build_info(device.queue.device, cl.program_build_info.LOG).strip() or str(error)
+        raise DeviceError(f"kernel {name!r} does not build on {device.description}:\n{log}") from error
+
+
+def build_stages(device: Device, config: KernelConfig) -> dict[str, cl.Kernel]:
+    """One kernel object per stage of `config`, and `accumulate`."""
+    names = (*config.stages, "accumulate")
+    return {name: cl.Kernel(build(device, stage_source(config, name), name), f"{name}_kernel") for name in names}

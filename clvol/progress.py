@@ -1,0 +1,134 @@
+"""Progress of a render: the record a renderer hands out, and the bar that shows it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress as RichBar
+    from rich.progress import TaskID
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a render is.
+
+    Parameters
+    ----------
+    samples_done : int
+        Samples per pixel finished so far.
+    samples_total : int or None
+        Samples per pixel asked for; None where only the time limit ends the render.
+    seconds : float
+        Time since the first launch.
+    time_limit : float or None
+        Seconds after which no new sample is begun.
+    noise : float
+        Mean relative standard error of the image so far (`clvol.result.relative_noise`); nan while unknown.
+    """
+
+    samples_done: int
+    samples_total: int | None
+    seconds: float
+    time_limit: float | None = None
+    noise: float = math.nan
+
+    @property
+    def fraction(self) -> float:
+        """Share of the work that is done, 0..1, by samples or by time, whichever ends the render first."""
+        shares = [0.0]
+        if self.samples_total:
+            shares.append(self.samples_done / self.samples_total)
+        if self.time_limit:
+            shares.append(self.seconds / self.time_limit)
+        return min(max(shares), 1.0)
+
+    @property
+    def seconds_left(self) -> float:
+        """Estimated seconds to the end, at the pace so far; nan while nothing is known."""
+        estimates = []
+        if self.samples_total is not None and self.samples_done > 0:
+            pace = self.seconds / self.samples_done
+            estimates.append(pace * (self.samples_total - self.samples_done))
+        if self.time_limit is not None:
+            estimates.append(self.time_limit - self.seconds)
+        return max(min(estimates), 0.0) if estimates else math.nan
+
+
+ProgressCallback = Callable[[Progress], None]
+"""What ``clvol.render(progress=...)`` accepts besides True and False."""
+
+
+def format_samples(record: Progress) -> str:
+    """Samples done, as "12/64 spp", or "12 spp" where only time ends the render."""
+    total = "" if record.samples_total is None else f"/{record.samples_total}"
+    return f"{record.samples_done}{total} spp"
+
+
+def format_noise(noise: float) -> str:
+    """Relative noise as a percentage, of two significant digits below 10 %; "unknown" for nan."""
+    if not math.isfinite(noise):
+        return "unknown"
+    percent = 100 * noise
+    return f"{percent:.2g} %" if percent < 10 else f"{percent:.0f} %"
+
+
+def format_seconds(seconds: float) -> str:
+    """Duration as "8 s", "2:05" or "1:02:05"; "-" for nan."""
+    if not math.isfinite(seconds):
+        return "-"
+    minutes, rest = divmod(math.ceil(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours}:{minutes:02}:{rest:02}"
+    return f"{minutes}:{rest:02}" if minutes else f"{rest} s"
+
+
+class RichProgress:
+    """Progress bar on standard error: samples done, time left and noise; silent where that is no terminal.
+
+    Use it as a context manager and call it with each `Progress` record.
+    """
+
+    def __init__(self, console: Console | None = None) -> None:
+        from rich.console import Console
+
+        self.console = console or Console(stderr=True)
+        self._bar: RichBar | None = None
+        self._task: TaskID | None = None
+
+    def __enter__(self) -> RichProgress:
+        from rich.progress import BarColumn, TextColumn
+        from rich.progress import Progress as RichBar
+
+        self._bar = RichBar(
+            TextColumn("rendering"),
+            BarColumn(),
+            TextColumn("{task.fields[samples]}  {task.fields[left]} left  noise {task.fields[noise]}"),
+            console=self.console,
+            disable=not self.console.is_terminal,
+            transient=True,
+        )
+        self._task = self._bar.add_task("rendering", total=1.0, samples="0 spp", left="-", noise="unknown")
+        self._bar.start()
+        return self
+
+    def __call__(self, record: Progress) -> None:
+        if self._bar is None or self._task is None:
+            return
+        self._bar.update(
+            self._task,
+            completed=record.fraction,
+            samples=format_samples(record),
+            left=format_seconds(record.seconds_left),
+            noise=format_noise(record.noise),
+        )
+
+    def __exit__(self, *_exception: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+        self._bar = self._task = None

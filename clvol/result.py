@@ -1,0 +1,248 @@
+"""What a render returns: the picture, how sure of it we are, what it cost, and how it was made.
+
+A result keeps the float64 sums it is made from, so that results of disjoint samples merge without loss.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from clvol.errors import OptionError
+
+Ranges = tuple[tuple[int, int], ...]
+"""Sample ranges as (first, count), ascending, disjoint, not touching."""
+
+_PER_RUN = frozenset({"spp", "samples", "seconds", "device", "time_limit", "interrupted"})
+"""Metadata that may differ between results that merge; everything else must agree."""
+
+_LARGEST = ("largest", "peak", "bytes", "slots", "pool")
+"""Statistics whose names begin so are maxima or sizes: merged by the maximum, not added."""
+
+
+def mean_and_variance(
+    sum_: np.ndarray, sum_of_squares: np.ndarray, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean of `count` samples and the variance of that mean, both float64 in the sums' shape.
+
+    The variance is (S2 - S1²/n) / (n (n - 1)), never below 0, and inf for a single sample: unknown.
+    """
+    mean = sum_ / count
+    if count < 2:
+        return mean, np.full_like(mean, np.inf)
+    spread = np.maximum(sum_of_squares - sum_ * mean, 0.0)
+    return mean, spread / (count * (count - 1.0))
+
+
+def relative_noise(image: np.ndarray, variance: np.ndarray) -> float:
+    """Mean standard error of the pixels over their mean radiance; nan where that is unknown.
+
+    Both means run over the pixels and channels whose value and variance are finite, so that a dark
+    background neither counts as infinitely noisy nor hides one bad pixel's nan.
+    """
+    known = np.isfinite(image) & np.isfinite(variance)
+    level = float(np.abs(image[known]).sum(dtype=np.float64))
+    if level == 0.0:
+        return math.nan
+    return float(np.sqrt(variance[known]).sum(dtype=np.float64)) / level
+
+
+@dataclass(eq=False)
+class Result:
+    """A rendered picture.
+
+    Parameters
+    ----------
+    image : float32 (height, width, 3)
+        Mean linear radiance.
+    variance : float32 (height, width, 3)
+        Variance of that mean, per pixel; inf after a single sample.
+    stats : dict
+        What it cost and what went wrong on the way: seconds by stage, paths, look-ups, violations, …
+    aovs : dict of str to array (height, width) or (height, width, channels)
+        Further pictures, means per path, e.g. "lookups".
+    metadata : dict
+        How the picture was made: scene, choices, spp, seed, device, version, seconds.
+    samples : (int, int)
+        First sample and number of samples of each pixel.
+    sum_, sum_of_squares : float64 (height, width, 3)
+        Sums over the samples, and over their squares.
+    ranges : tuple of (int, int)
+        The same as `samples`, but exact where merged ranges leave gaps.
+    """
+
+    image: np.ndarray
+    variance: np.ndarray
+    stats: dict[str, Any]
+    aovs: dict[str, np.ndarray]
+    metadata: dict[str, Any]
+    samples: tuple[int, int]
+    sum_: np.ndarray
+    sum_of_squares: np.ndarray
+    ranges: Ranges = ()
+
+    def __post_init__(self) -> None:
+        self.ranges = self.ranges or (self.samples,)
+
+    @classmethod
+    def from_sums(
+        cls,
+        sum_: np.ndarray,
+        sum_of_squares: np.ndarray,
+        samples: tuple[int, int],
+        aovs: dict[str, np.ndarray],
+        stats: dict[str, Any],
+        metadata: dict[str, Any],
+    ) -> Result:
+        """Make a result of the sums over ``samples = (first, count)``; count must be at least 1."""
+        first, count = (int(number) for number in samples)
+        if count < 1:
+            raise OptionError("a result needs at least one sample per pixel")
+        sum_ = np.asarray(sum_, np.float64)
+        sum_of_squares = np.asarray(sum_of_squares, np.float64)
+        mean, variance = mean_and_variance(sum_, sum_of_squares, count)
+        return cls(
+            image=mean.astype(np.float32),
+            variance=variance.astype(np.float32),
+            stats=stats,
+            aovs=aovs,
+            metadata=metadata,
+            samples=(first, count),
+            sum_=sum_,
+            sum_of_squares=sum_of_squares,
+        )
+
+    @property
+    def noise(self) -> float:
+        """Mean relative standard error of the image (`relative_noise`)."""
+        return relative_noise(self.image, self.variance)
+
+    def save(self, path: str | PathLike[str], exposure: float = 0.0) -> None:
+        """Write the picture as .exr (everything, linear) or .png (tone-mapped), by the path's suffix.
+
+        An EXR holds R, G, B, variance.R/G/B and every AOV as float32 channels of one part.  A PNG is
+        raised by `exposure` stops and goes through `clvol.image_io.tone_map`.  Both carry the metadata.
+        An earlier file of that name is replaced only once the new one is complete.
+
+        Raises
+        ------
+        OptionError
+            Unknown suffix, or a folder that is missing or cannot be written to.
+        """
+        from clvol import image_io
+
+        if image_io.output_suffix(path) == ".png":
+            image_io.write_png(path, self.image, self.metadata, exposure)
+        else:
+            channels = image_io.split_channels("", self.image) | image_io.split_channels(
+                "variance", self.variance
+            )
+            for name, plane in self.aovs.items():
+                channels |= image_io.split_channels(name, plane)
+            image_io.write_exr(path, channels, self.metadata)
+
+
+def merge(results: Iterable[Result]) -> Result:
+    """Combine results of disjoint sample ranges of one render into the result of all samples.
+
+    Sums and counts add up; AOVs are means weighted by the samples; statistics add, but for maxima and
+    sizes (names that begin with "largest", "peak", "bytes", "slots", "pool"), of which the largest stays.
+
+    Raises
+    ------
+    OptionError
+        No results; overlapping sample ranges; or another size, scene, seed or choice: which, it says.
+    """
+    results = sorted(results, key=lambda result: result.ranges)
+    if not results:
+        raise OptionError("nothing to merge", hint="give at least one result")
+    for other in results[1:]:
+        _check_same_render(results[0], other)
+    ranges = _joined([span for result in results for span in result.ranges])
+    counts = [result.samples[1] for result in results]
+    merged = Result.from_sums(
+        sum_=np.sum([result.sum_ for result in results], axis=0),
+        sum_of_squares=np.sum([result.sum_of_squares for result in results], axis=0),
+        samples=(ranges[0][0], sum(counts)),
+        aovs={name: _weighted_mean(name, results, counts) for name in results[0].aovs},
+        stats=_merged_stats([result.stats for result in results]),
+        metadata=_merged_metadata([result.metadata for result in results], sum(counts)),
+    )
+    merged.ranges = ranges
+    return merged
+
+
+def _check_same_render(one: Result, other: Result) -> None:
+    """Raise OptionError where the two are not samples of the same picture."""
+    pairs: dict[str, tuple[Any, Any]] = {
+        "size": (one.image.shape[1::-1], other.image.shape[1::-1]),
+        "aovs": (sorted(one.aovs), sorted(other.aovs)),
+    }
+    for key in sorted((one.metadata.keys() | other.metadata.keys()) - _PER_RUN):
+        pairs[key] = (one.metadata.get(key), other.metadata.get(key))
+    for key, (ours, theirs) in pairs.items():
+        if ours != theirs:
+            raise OptionError(
+                f"cannot merge results of a different {key}: {ours!r} and {theirs!r}",
+                hint="only sample ranges of the same render can be merged",
+            )
+
+
+def _joined(spans: Sequence[tuple[int, int]]) -> Ranges:
+    """Sort sample ranges and join those that touch; OptionError where two overlap."""
+    joined: list[tuple[int, int]] = []
+    for first, count in sorted(spans):
+        if joined and first < sum(joined[-1]):
+            raise OptionError(
+                f"cannot merge overlapping samples: {first} to {min(sum(joined[-1]), first + count) - 1} "
+                "occur twice",
+                hint="render disjoint ranges with samples=(first, count)",
+            )
+        if joined and first == sum(joined[-1]):
+            joined[-1] = (joined[-1][0], joined[-1][1] + count)
+        else:
+            joined.append((first, count))
+    return tuple(joined)
+
+
+def _weighted_mean(name: str, results: Sequence[Result], counts: Sequence[int]) -> np.ndarray:
+    """Mean of one AOV weighted by the number of samples, float32."""
+    total = sum(
+        result.aovs[name].astype(np.float64) * count for result, count in zip(results, counts, strict=True)
+    )
+    return np.asarray(total / sum(counts), np.float32)
+
+
+def _merged_stats(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Merge dictionaries of statistics, nested ones too; a name only some of them have is kept."""
+    names = dict.fromkeys(name for part in parts for name in part)
+    return {name: _merged_stat(name, [part[name] for part in parts if name in part]) for name in names}
+
+
+def _merged_stat(name: str, values: Sequence[Any]) -> Any:
+    """Merge one statistic: dictionaries by entry, flags by "or", numbers by sum or maximum, others listed."""
+    if all(isinstance(value, dict) for value in values):
+        return _merged_stats(values)
+    if all(isinstance(value, bool | np.bool_) for value in values):
+        return any(values)
+    if all(isinstance(value, int | float | np.number) for value in values):
+        return max(values) if name.lower().startswith(_LARGEST) else sum(values)
+    return values[0] if all(value == values[0] for value in values[1:]) else list(values)
+
+
+def _merged_metadata(parts: Sequence[dict[str, Any]], spp: int) -> dict[str, Any]:
+    """Metadata of the whole: the shared entries, the total of samples and seconds, every device used."""
+    merged = {key: value for key, value in parts[0].items() if all(part.get(key) == value for part in parts)}
+    merged["spp"] = spp
+    seconds = [part["seconds"] for part in parts if "seconds" in part]
+    if seconds:
+        merged["seconds"] = sum(seconds)
+    devices = dict.fromkeys(str(part["device"]) for part in parts if "device" in part)
+    if devices:
+        merged["device"] = "; ".join(devices)
+    return merged

@@ -1,0 +1,9 @@
+"""Scenes: from Mitsuba 3 XML files and dicts to the plain records of `clvol.scene.records`.
+
+Syntax, defaults and checks live here; nothing of OpenCL, and nothing that reads voxels from a file.
+"""
+
+from clvol.scene.loader import load_dict, load_file
+from clvol.scene.transforms import look_at, rotate, scale, translate
+
+__all__ = ["load_dict", "load_file", "look_at", "rotate", "scale", "translate"]

@@ -1,0 +1,109 @@
+"""From nodes to records: finds a plugin's kind, follows references, and builds each node once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from clvol.errors import SceneError
+from clvol.scene.nodes import Node
+from clvol.scene.reader import Reader
+from clvol.scene.vocabulary import LATER, did_you_mean, join_hints, listed
+from clvol.volumes.grid import Grid
+
+PluginTable = Mapping[str, Mapping[str, Callable[[Reader], object]]]
+
+
+class Builder:
+    """Builds the plugins of one scene.
+
+    Parameters
+    ----------
+    root : Node
+        The scene, searched for ids.
+    plugins : mapping of kind to mapping of plugin name to function
+        What is supported; each function turns a `Reader` into a record.
+
+    Raises
+    ------
+    SceneError
+        Two nodes with the same id.
+    """
+
+    def __init__(self, root: Node, plugins: PluginTable) -> None:
+        self.plugins = plugins
+        self.grids: dict[tuple[Path, str | None], Grid] = {}
+        self._ids: dict[str, Node] = {}
+        self._built: dict[int, Any] = {}
+        self._collect_ids(root)
+
+    def _collect_ids(self, node: Node) -> None:
+        for _, value in node.parameters():
+            if not isinstance(value, Node) or value.is_value or value.type == "ref":
+                continue
+            if value.id in self._ids:
+                first = self._ids[value.id].where
+                raise SceneError(f"the id '{value.id}' is given twice", value.where, f"first at {first}")
+            if value.id:
+                self._ids[value.id] = value
+            self._collect_ids(value)
+
+    def resolve(self, node: Node) -> Node:
+        """The node that a `ref` stands for; any other node itself."""
+        if node.type != "ref":
+            return node
+        target = node.get("id")
+        for key, _ in node.parameters():
+            if key not in ("id", "name"):
+                raise SceneError(f"unknown parameter '{key}' of 'ref'", node.place(key), "supported: id")
+        if not isinstance(target, str):
+            raise SceneError("a ref without an id", node.where)
+        if target not in self._ids:
+            raise SceneError(
+                f"ref to an unknown id '{target}'",
+                node.where,
+                join_hints(did_you_mean(target, self._ids), f"ids here: {listed(self._ids)}"),
+            )
+        return self._ids[target]
+
+    def kind_of(self, node: Node) -> str:
+        """What a node is ("shape", "medium", …): its XML tag, or what its type says.
+
+        Raises
+        ------
+        SceneError
+            An unknown type without a tag, or a tag that contradicts the type.
+        """
+        by_type = next(
+            (kind for table in (self.plugins, LATER) for kind, types in table.items() if node.type in types),
+            "",
+        )
+        if node.kind and by_type and node.kind != by_type:
+            raise SceneError(f"'{node.type}' is a {by_type}, not a {node.kind}", node.where)
+        if not node.kind and not by_type:
+            known = [name for types in self.plugins.values() for name in types]
+            hint = join_hints(did_you_mean(node.type, known), f"supported: {listed(known)}")
+            raise SceneError(f"unknown plugin '{node.type}'", node.where, hint)
+        return node.kind or by_type
+
+    def check_supported(self, node: Node) -> None:
+        """Raise for a plugin that is unknown, or known but not supported in this version."""
+        kind = self.kind_of(node)
+        supported = self.plugins.get(kind, {})
+        if node.type in supported:
+            return
+        what, guess = f"unknown {kind} '{node.type}'", did_you_mean(node.type, supported)
+        if node.type in LATER.get(kind, ()):
+            what, guess = f"{kind} '{node.type}' is not supported in this version", ""
+        raise SceneError(what, node.where, join_hints(guess, f"supported: {listed(supported)}"))
+
+    def build(self, node: Node) -> Any:
+        """The record of a node; the same object each time, so that what is shared stays shared."""
+        if id(node) not in self._built:
+            self.check_supported(node)
+            reader = Reader(node, self)
+            record = self.plugins[reader.kind][node.type](reader)
+            reader.finish()
+            self._built[id(node)] = record
+        return self._built[id(node)]

@@ -1,0 +1,78 @@
+"""Emitters: environments, parallel light and point lights."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clvol.scene.files import find_parameter
+from clvol.scene.image import image_from_array, read_image
+from clvol.scene.reader import Reader
+from clvol.scene.records import ConstantEmitter, DirectionalEmitter, EnvmapEmitter, PointEmitter
+
+NEGLIGIBLE = 1e-5
+"""Share of the brightest value down to which negative values are rounding (colours out of the gamut)."""
+
+
+def constant(reader: Reader) -> ConstantEmitter:
+    """The `constant` plugin: the same radiance from everywhere."""
+    _accept_common(reader)
+    reader.transform()  # turns nothing, and is allowed on every emitter
+    return ConstantEmitter(reader.color("radiance", 1.0, light=True))
+
+
+def envmap(reader: Reader) -> EnvmapEmitter:
+    """The `envmap` plugin: a lat-long image, from a file or an array, Y up under `to_world`.
+
+    Slightly negative values, which converted photographs have, become 0 (see `NEGLIGIBLE`).
+    """
+    _accept_common(reader)
+    reader.ignore("mis_compensation")
+    if reader.has("filename") == reader.has("bitmap"):
+        reader.fail("an envmap needs either a filename or a bitmap (array)")
+    if reader.has("filename"):
+        source = str(find_parameter(reader, "filename"))
+        radiance = read_image(source, reader.node.place("filename"))
+        place = "filename"
+    else:
+        source = place = "bitmap"
+        radiance = image_from_array(reader.array("bitmap"), reader.node.place("bitmap"))
+    if radiance.shape[0] < 3 or radiance.shape[1] < 2:
+        reader.fail(
+            f"an envmap has at least 2 x 3 pixels, got {radiance.shape[1]} x {radiance.shape[0]}", place
+        )
+    radiance = radiance * np.float32(reader.number("scale", 1.0, minimum=0.0))
+    broken = ~np.isfinite(radiance) | (radiance < -NEGLIGIBLE * radiance.max())
+    if broken.any():
+        row, column = np.argwhere(broken)[0][:2]
+        reader.fail(f"radiance must be finite and >= 0; it is not at row {row}, column {column}", place)
+    return EnvmapEmitter(np.maximum(radiance, 0), reader.transform(), source)
+
+
+def directional(reader: Reader) -> DirectionalEmitter:
+    """The `directional` plugin: light travels along `direction`, or along `to_world`'s local +z."""
+    _accept_common(reader)
+    irradiance = reader.color("irradiance", 1.0, light=True)
+    if reader.has("direction") and reader.has("to_world"):
+        reader.fail("give either direction or to_world, not both", "to_world")
+    direction = reader.vector("direction", reader.transform()[:3, 2])
+    length = np.linalg.norm(direction)
+    if length == 0:
+        reader.fail("direction is zero", "direction")
+    return DirectionalEmitter(irradiance, tuple((direction / length).tolist()))
+
+
+def point(reader: Reader) -> PointEmitter:
+    """The `point` plugin: at `position`, or at the origin of `to_world`."""
+    _accept_common(reader)
+    intensity = reader.color("intensity", 1.0, light=True)
+    if reader.has("position") and reader.has("to_world"):
+        reader.fail("give either position or to_world, not both", "to_world")
+    position = reader.vector("position", reader.transform()[:3, 3])
+    return PointEmitter(intensity, tuple(position.tolist()))
+
+
+def _accept_common(reader: Reader) -> None:
+    """What every emitter may carry: a share of the samples, and the medium round it (found without)."""
+    reader.ignore("sampling_weight")
+    for _, medium in reader.children("medium"):
+        reader.build.build(medium)

@@ -1,0 +1,34 @@
+"""Where the files that a scene names are found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from clvol.errors import SceneError
+from clvol.scene.reader import Reader
+
+
+def find(name: str, folders: Sequence[Path], where: str) -> Path:
+    """The first of `folders` that holds file `name`, joined with it; an absolute `name` as it is.
+
+    Raises
+    ------
+    SceneError
+        At `where`: no such file.
+    """
+    for folder in folders:
+        path = folder / name
+        try:
+            if path.is_file():
+                return path
+        except (OSError, ValueError):  # a name too long for the system, or with a NUL in it
+            continue
+    looked = ", ".join(str(folder.absolute()) for folder in folders)
+    hint = "check the absolute path" if Path(name).is_absolute() else f"looked in {looked}"
+    raise SceneError(f"file '{name}' does not exist", where, hint)
+
+
+def find_parameter(reader: Reader, name: str) -> Path:
+    """The file that string parameter `name`, which must be given, names."""
+    return find(reader.string(name, ""), reader.node.folders, reader.node.place(name))

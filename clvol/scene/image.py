@@ -1,0 +1,67 @@
+"""Pictures used as input: any file OpenImageIO reads, or an array, as linear float32 RGB."""
+
+from __future__ import annotations
+
+import numpy as np
+import OpenImageIO as oiio  # noqa: N813
+
+from clvol.errors import SceneError
+from clvol.scene.spectra import srgb_to_linear
+
+MAX_PIXELS = 2**28
+
+
+def read_image(path: str, where: str) -> np.ndarray:
+    """The image in file `path` as linear RGB, float32 (height, width, 3), top row first.
+
+    8-bit files, and PNG of any depth, are sRGB-decoded; grey images are replicated, alpha is dropped.
+
+    Raises
+    ------
+    SceneError
+        At `where`: not an image, damaged, or larger than `MAX_PIXELS`.
+    """
+    opened = oiio.ImageInput.open(path)
+    if opened is None:
+        raise SceneError(f"cannot read image '{path}'", where, _reason(oiio.geterror()))
+    try:
+        spec = opened.spec()
+        if spec.width * spec.height * spec.depth > MAX_PIXELS:
+            raise SceneError(f"image '{path}' has more than {MAX_PIXELS} pixels", where)
+        pixels = opened.read_image(0, 0, 0, spec.nchannels, oiio.FLOAT)
+        if pixels is None:
+            raise SceneError(f"cannot read image '{path}'", where, _reason(opened.geterror()))
+        integers = str(spec.format) in ("uint8", "uint16")
+        encoded = str(spec.format) == "uint8" or (integers and opened.format_name() == "png")
+    finally:
+        opened.close()
+    return _linear_rgb(np.asarray(pixels), encoded)
+
+
+def image_from_array(array: np.ndarray, where: str) -> np.ndarray:
+    """`array` (height, width) or (height, width, 1..4 channels) as linear RGB, float32 (height, width, 3).
+
+    uint8 values are sRGB-encoded, uint16 values linear, both from 0 to their type's maximum.
+
+    Raises
+    ------
+    SceneError
+        At `where`: another shape, or another integer type.
+    """
+    pixels = array[..., None] if array.ndim == 2 else array
+    if pixels.ndim != 3 or not 1 <= pixels.shape[2] <= 4 or pixels.size == 0:
+        raise SceneError(f"expected an image (height, width, 3), got shape {array.shape}", where)
+    if pixels.dtype.kind != "f":
+        if pixels.dtype not in (np.uint8, np.uint16):
+            raise SceneError(f"expected floats, uint8 or uint16, got {array.dtype}", where)
+        pixels = pixels / np.float32(np.iinfo(pixels.dtype).max)
+    return _linear_rgb(pixels, array.dtype == np.uint8)
+
+
+def _linear_rgb(pixels: np.ndarray, encoded: bool) -> np.ndarray:
+    rgb = pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
+    return np.ascontiguousarray(srgb_to_linear(rgb) if encoded else rgb, dtype=np.float32)
+
+
+def _reason(message: str) -> str:
+    return " ".join(message.split()) or "unknown or damaged format"

@@ -1,0 +1,121 @@
+"""`load_file` and `load_dict`: the table of supported plugins, and the scene as a whole."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from clvol.errors import SceneError
+from clvol.scene import emitter, integrator, medium, sensor, shape, volume
+from clvol.scene.builder import Builder, PluginTable
+from clvol.scene.nodes import Node, from_dict
+from clvol.scene.records import ConstantEmitter, EnvmapEmitter, Integrator, Scene
+from clvol.scene.xml import read_xml
+
+PLUGINS: PluginTable = {
+    "integrator": {"volpath": integrator.volpath, "volpathmis": integrator.volpath},
+    "sensor": {"perspective": sensor.perspective},
+    "film": {"hdrfilm": sensor.hdrfilm},
+    "rfilter": {"box": sensor.box, "tent": sensor.tent, "gaussian": sensor.gaussian},
+    "sampler": {"independent": sensor.independent},
+    "shape": {"cube": shape.cube, "sphere": shape.sphere},
+    "bsdf": {"null": shape.null},
+    "medium": {"homogeneous": medium.homogeneous, "heterogeneous": medium.heterogeneous},
+    "volume": {
+        "gridvolume": volume.gridvolume,
+        "constvolume": volume.constvolume,
+        "vdbvolume": volume.vdbvolume,
+    },
+    "phase": {"isotropic": medium.isotropic, "hg": medium.hg},
+    "emitter": {
+        "constant": emitter.constant,
+        "envmap": emitter.envmap,
+        "directional": emitter.directional,
+        "point": emitter.point,
+    },
+    "texture": {},
+}
+"""Kind -> plugin name -> the function that builds its record."""
+
+
+def load_file(path: str | Path, **defaults: object) -> Scene:
+    """Read a Mitsuba 3 XML scene.
+
+    Parameters
+    ----------
+    path : str or Path
+        The XML file.  Files it names are looked for in its `<path>`s (the last first), then in its folder.
+    **defaults
+        Values that replace those of `<default name= value=>`.
+
+    Raises
+    ------
+    SceneError
+        Whatever cannot be understood or is not supported, with file and line; a keyword that no `$name` uses.
+    VolumeError
+        A volume file that is broken or holds no valid coefficients.
+    """
+    return _build(read_xml(Path(path), defaults), source=str(path))
+
+
+def load_dict(scene: Mapping[str, object]) -> Scene:
+    """Make a scene from nested dicts, as `mi.load_dict` takes them.
+
+    Arrays serve as grids and bitmaps, 4x4 arrays and objects with a 4x4 ``.matrix`` as transforms.  File
+    names are relative to the working directory.
+
+    Raises
+    ------
+    SceneError, VolumeError
+        As `load_file`, with a path such as ``scene.shape_1.interior.sigma_t`` for the place.
+    """
+    return _build(from_dict(scene), source="")
+
+
+def _build(root: Node, source: str) -> Scene:
+    if root.type != "scene":
+        raise SceneError(f"expected a scene, got a '{root.type}'", root.where)
+    builder = Builder(root, PLUGINS)
+    records: dict[str, list] = {kind: [] for kind in PLUGINS}
+    seen: set[int] = set()
+    for name, value in root.parameters():
+        if not isinstance(value, Node) or value.is_value:
+            raise SceneError(
+                f"unknown parameter '{name}' of the scene", root.place(name), "it holds plugins only"
+            )
+        node = builder.resolve(value)
+        if id(node) not in seen:
+            seen.add(id(node))
+            records[builder.kind_of(node)].append((node, builder.build(node)))
+    camera = _exactly_one_sensor(records["sensor"], root)
+    environments = [
+        node for node, record in records["emitter"] if isinstance(record, ConstantEmitter | EnvmapEmitter)
+    ]
+    if len(environments) > 1:
+        raise SceneError(
+            "a scene takes one environment emitter, this is the second",
+            environments[1].where,
+            f"the first is at {environments[0].where}",
+        )
+    if len(records["integrator"]) > 1:
+        raise SceneError(
+            "a scene takes one integrator, this is the second", records["integrator"][1][0].where
+        )
+    return Scene(
+        sensor=camera.camera,
+        film=camera.film,
+        integrator=records["integrator"][0][1] if records["integrator"] else Integrator(),
+        shapes=tuple(record for _, record in records["shape"]),
+        emitters=tuple(record for _, record in records["emitter"]),
+        spp=camera.sampler.spp,
+        seed=camera.sampler.seed,
+        source=source,
+    )
+
+
+def _exactly_one_sensor(sensors: list[tuple[Node, sensor.Sensor]], root: Node) -> sensor.Sensor:
+    if not sensors:
+        raise SceneError("the scene has no sensor", root.where, 'add a <sensor type="perspective">')
+    if len(sensors) > 1:
+        raise SceneError("a scene takes one sensor, this is the second", sensors[1][0].where)
+    return sensors[0][1]

@@ -1,0 +1,100 @@
+"""The nested dicts that a scene is before it becomes records; each knows where it was written.
+
+XML files and Python dicts both turn into `Node`s, and everything after that treats them alike.
+Nothing here knows what a plugin or a parameter means.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from clvol.errors import SceneError
+
+MAX_DEPTH = 64
+"""Deepest nesting accepted: far beyond any scene, well within Python's recursion limit."""
+
+VALUE_TYPES = ("rgb", "spectrum")
+"""Nodes that stand for a value, not for a plugin."""
+
+
+class Node(dict):
+    """One plugin or colour: parameter name -> value, with the plugin's name under "type".
+
+    Parameters
+    ----------
+    where : str
+        Its place for messages: "scene.xml:12", or "scene.shape_1" for dicts.
+    kind : str
+        What the XML tag calls it ("shape", "medium", …); "" in dicts, where the type alone tells.
+    id : str
+        Name that a `ref` may use; "" without.
+    folders : list of Path
+        Where relative file names are looked for, first match first.
+    """
+
+    def __init__(self, where: str, kind: str = "", id: str = "", folders: list[Path] | None = None) -> None:
+        super().__init__()
+        self.where, self.kind, self.id = where, kind, id
+        self.folders = folders if folders is not None else [Path()]
+        self.places: dict[str, str] = {}
+
+    @property
+    def type(self) -> str:
+        """The plugin's name."""
+        return self["type"]
+
+    @property
+    def is_value(self) -> bool:
+        """Whether this is a colour and not a plugin."""
+        return not self.kind and self.type in VALUE_TYPES
+
+    def place(self, key: str) -> str:
+        """Where parameter `key` was written."""
+        return self.places.get(key, self.where)
+
+    def parameters(self) -> Iterator[tuple[str, object]]:
+        """All (name, value) but "type"."""
+        return ((key, value) for key, value in self.items() if key != "type")
+
+    def add(self, key: str, value: object, where: str) -> None:
+        """Set parameter `key`, once.
+
+        Raises
+        ------
+        SceneError
+            The node has it already.
+        """
+        if key in self:
+            raise SceneError(f"'{key}' is given twice in '{self.get('type', self.kind)}'", where)
+        self[key] = value
+        self.places[key] = where
+
+
+def from_dict(source: Mapping, where: str = "scene", depth: int = 0) -> Node:
+    """A scene dict as nodes; `where` is the path so far, as in ``scene.shape_1.interior``.
+
+    Raises
+    ------
+    SceneError
+        A dict without a "type", a key that is not a string, or nesting without end.
+    """
+    if depth > MAX_DEPTH:
+        raise SceneError(f"dicts are nested more than {MAX_DEPTH} deep", where, "does one contain itself?")
+    if not isinstance(source, Mapping):
+        raise SceneError(f"expected a dict, got {type(source).__name__}", where)
+    if not isinstance(source.get("type"), str):
+        raise SceneError("a dict without a 'type'", where, "give the plugin's name: {'type': 'sphere', ...}")
+    key_as_id = where.rpartition(".")[2] if depth == 1 else ""  # Mitsuba: at the top, keys are ids
+    node_id = source.get("id", key_as_id) if source["type"] != "ref" else ""
+    if not isinstance(node_id, str):
+        raise SceneError(f"expected a string as id, got {node_id!r}", f"{where}.id")
+    node = Node(where, id=node_id)
+    for key, value in source.items():
+        if not isinstance(key, str):
+            raise SceneError(f"parameter names are strings, got {key!r}", where)
+        if key == "id" and source["type"] != "ref":
+            continue
+        path = f"{where}.{key}"
+        node.add(key, from_dict(value, path, depth + 1) if isinstance(value, Mapping) else value, path)
+    return node

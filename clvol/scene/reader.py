@@ -1,0 +1,281 @@
+"""Typed access to one node's parameters: reading a parameter is what declares it as supported.
+
+A builder asks for every parameter it knows and then calls `finish`, which refuses what is left over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from numbers import Integral, Real
+from typing import TYPE_CHECKING, NoReturn
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from clvol.errors import SceneError
+from clvol.scene import spectra
+from clvol.scene.nodes import Node
+from clvol.scene.records import Spectrum
+from clvol.scene.transforms import as_matrix
+from clvol.scene.vocabulary import did_you_mean, join_hints, listed
+
+if TYPE_CHECKING:
+    from clvol.scene.builder import Builder
+
+
+class Reader:
+    """The parameters of `node`, converted and checked as a builder asks for them.
+
+    All methods raise `SceneError` with the parameter's place when its value does not fit.
+    """
+
+    def __init__(self, node: Node, build: Builder) -> None:
+        self.node, self.build = node, build
+        self.type = node.type
+        self.kind = build.kind_of(node)
+        self._asked: list[str] = []
+        self._silent: set[str] = set()
+        self._used: set[str] = set()
+
+    # -- asking ------------------------------------------------------------------------------------
+
+    def has(self, name: str) -> bool:
+        """Whether the scene gives `name`, which is thereby known."""
+        if name not in self._asked:
+            self._asked.append(name)
+        return name in self.node
+
+    def fail(self, what: str, name: str = "", hint: str = "") -> NoReturn:
+        """Raise a `SceneError` at parameter `name`, or at the plugin itself."""
+        where = self.node.place(name) if name else self.node.where
+        raise SceneError(what, where, hint)
+
+    def _take(self, name: str) -> object:
+        self._used.add(name)
+        return self.node[name]
+
+    def _wrong(self, name: str, expected: str, value: object) -> NoReturn:
+        shown = f"a '{value.type}'" if isinstance(value, Node) else repr(value)[:60]
+        self.fail(f"'{name}' of {self.kind} '{self.type}' must be {expected}, got {shown}", name)
+
+    # -- plain values ------------------------------------------------------------------------------
+
+    def number(
+        self,
+        name: str,
+        default: float,
+        minimum: float = -np.inf,
+        maximum: float = np.inf,
+        open_interval: bool = False,
+    ) -> float:
+        """A finite number in [minimum, maximum], or between them exclusively."""
+        if not self.has(name):
+            return default
+        value = self._take(name)
+        if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
+            self._wrong(name, "a number", value)
+        number = _float(value)
+        inside = minimum < number < maximum if open_interval else minimum <= number <= maximum
+        if not np.isfinite(number) or not inside:
+            self._wrong(name, _range(minimum, maximum, open_interval), number)
+        return number
+
+    def integer(self, name: str, default: int, minimum: int, maximum: int = 2**31 - 1) -> int:
+        """An integer in [minimum, maximum]."""
+        if not self.has(name):
+            return default
+        value = self._take(name)
+        if isinstance(value, bool | np.bool_) or not isinstance(value, Integral):
+            self._wrong(name, "an integer", value)
+        if not minimum <= int(value) <= maximum:
+            self._wrong(name, f"an integer from {minimum} to {maximum}", int(value))
+        return int(value)
+
+    def boolean(self, name: str, default: bool) -> bool:
+        """True or false."""
+        if not self.has(name):
+            return default
+        value = self._take(name)
+        if not isinstance(value, bool | np.bool_):
+            self._wrong(name, "true or false", value)
+        return bool(value)
+
+    def string(self, name: str, default: str, choices: Sequence[str] = ()) -> str:
+        """A string; one of `choices` where there are any."""
+        if not self.has(name):
+            return default
+        value = self._take(name)
+        if not isinstance(value, str):
+            self._wrong(name, "a string", value)
+        if choices and value not in choices:
+            hint = join_hints(did_you_mean(value, choices), f"supported: {listed(choices)}")
+            self.fail(f"'{name}' of {self.kind} '{self.type}' cannot be '{value}'", name, hint)
+        return value
+
+    def vector(self, name: str, default: ArrayLike) -> np.ndarray:
+        """Three finite numbers, float64 (3,)."""
+        if not self.has(name):
+            return np.array(default, dtype=np.float64)
+        value = self._take(name)
+        try:
+            vector = np.asarray(value)
+            vector = vector.astype(np.float64) if vector.dtype.kind in "iuf" else np.empty(0)
+        except (TypeError, ValueError, OverflowError):
+            vector = np.empty(0)
+        if vector.shape != (3,) or not np.isfinite(vector).all():
+            self._wrong(name, "three finite numbers", value)
+        return vector
+
+    def transform(self, name: str = "to_world") -> np.ndarray:
+        """An invertible 4x4 float64 matrix; the identity when not given."""
+        if not self.has(name):
+            return np.eye(4)
+        try:
+            return as_matrix(self._take(name))
+        except SceneError as error:
+            raise SceneError(
+                f"'{name}' of {self.kind} '{self.type}': {error.what}", self.node.place(name), error.hint
+            ) from None
+
+    def array(self, name: str) -> np.ndarray:
+        """A numeric NumPy array, or what turns into one; `name` must be given."""
+        value = self._take(name)
+        try:
+            array = np.asarray(value)
+        except (TypeError, ValueError, OverflowError):
+            array = np.empty(0, dtype=object)
+        if array.dtype.kind not in "buif":
+            self._wrong(name, "an array of numbers", value)
+        return array
+
+    # -- colours -----------------------------------------------------------------------------------
+
+    def is_value(self, name: str) -> bool:
+        """Whether `name` holds a number or a colour rather than a plugin."""
+        value = self.node.get(name)
+        return not isinstance(value, Node) or value.is_value
+
+    def color(self, name: str, default: float, light: bool = False, maximum: float = np.inf) -> Spectrum:
+        """A number, rgb or spectrum with components in [0, maximum]: one number if grey, else three.
+
+        `light`: spectra are seen under equal energy and not under D65.
+        """
+        if not self.has(name):
+            return (float(default),)
+        value = self._take(name)
+        if not isinstance(value, Node):
+            if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
+                self._wrong(name, "a number, an rgb or a spectrum", value)
+            rgb = np.array([_float(value)])
+        elif value.type == "rgb":
+            rgb = self._rgb(name, value)
+        elif value.type == "spectrum":
+            rgb = self._spectrum(name, value, light, maximum)
+        else:
+            self._wrong(name, "a number, an rgb or a spectrum", value)
+        if not np.isfinite(rgb).all() or (rgb < 0).any() or (rgb > maximum).any():
+            self._wrong(name, _range(0, maximum, False), rgb.tolist())
+        components = tuple(rgb.tolist())
+        return components[:1] if len(set(components)) == 1 else components
+
+    def _colour_value(self, name: str, node: Node) -> object:
+        extra = [key for key, _ in node.parameters() if key != "value"]
+        if extra or "value" not in node:
+            self.fail(
+                f"'{node.type}' '{name}' " + (f"has an unknown '{extra[0]}'" if extra else "has no 'value'"),
+                name,
+            )
+        return node["value"]
+
+    def _rgb(self, name: str, node: Node) -> np.ndarray:
+        value = self._colour_value(name, node)
+        try:
+            rgb = np.array(value, dtype=np.float64).reshape(-1)
+        except (TypeError, ValueError, OverflowError):
+            rgb = np.empty(0)
+        if rgb.size not in (1, 3):
+            self._wrong(name, "one or three numbers", value)
+        return rgb
+
+    def _spectrum(self, name: str, node: Node, light: bool, maximum: float) -> np.ndarray:
+        value = self._colour_value(name, node)
+        if isinstance(value, Real) and not isinstance(value, bool):
+            return spectra.constant_to_rgb(_float(value)) if light else np.array([_float(value)])
+        try:
+            pairs = np.array(value, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
+            pairs = np.empty(0)
+        if pairs.ndim != 2 or pairs.shape[1:] != (2,) or len(pairs) < 2:
+            self._wrong(name, "a number, or at least two wavelength:value pairs", value)
+        if not np.isfinite(pairs).all() or (np.diff(pairs[:, 0]) <= 0).any() or (pairs[:, 1] < 0).any():
+            self._wrong(name, "pairs of increasing wavelengths (nm) and values >= 0", value)
+        # Out of the gamut of what can be, Mitsuba cuts; a spectrum in [0, 1] may well be.
+        return np.minimum(spectra.sampled_to_rgb(pairs[:, 0], pairs[:, 1], light), maximum)
+
+    # -- plugins inside ----------------------------------------------------------------------------
+
+    def children(self, kind: str, name: str = "") -> list[tuple[str, Node]]:
+        """All (name, node) of plugins of one kind inside this one, references resolved.
+
+        With `name`, only the one of that name.
+        """
+        found = []
+        for key, value in self.node.parameters():
+            if isinstance(value, Node) and not value.is_value and name in ("", key):
+                target = self.build.resolve(value)
+                if self.build.kind_of(target) == kind:
+                    self._used.add(key)
+                    found.append((key, target))
+        return found
+
+    def only_child(self, kind: str) -> Node | None:
+        """The one plugin of this kind inside, or None."""
+        found = self.children(kind)
+        if len(found) > 1:
+            self.fail(f"{self.kind} '{self.type}' takes one {kind}, got {len(found)}", found[1][0])
+        return found[0][1] if found else None
+
+    # -- the rest ----------------------------------------------------------------------------------
+
+    def ignore(self, *names: str) -> None:
+        """Accept parameters that have no effect on the expected image."""
+        self._silent.update(names)
+
+    def refuse(self, name: str, hint: str = "") -> None:
+        """Raise if the scene gives `name`, a known parameter that is not supported yet."""
+        if name in self.node:
+            self.fail(f"'{name}' of {self.kind} '{self.type}' is not supported in this version", name, hint)
+
+    def refuse_plugin(self, name: str, expected: str = "") -> NoReturn:
+        """Raise for the plugin in parameter `name`: not supported at all, or not here."""
+        inner = self.build.resolve(self.node[name])
+        self.build.check_supported(inner)
+        if expected:
+            self._wrong(name, expected, inner)
+        self.fail(f"{self.kind} '{self.type}' takes no {self.build.kind_of(inner)} ('{inner.type}')", name)
+
+    def finish(self) -> None:
+        """Raise for the first parameter or inner plugin that nobody asked for."""
+        for name, value in self.node.parameters():
+            if name in self._used or name in self._silent or name in self._asked:
+                continue
+            if isinstance(value, Node) and not value.is_value:
+                self.refuse_plugin(name)
+            hint = join_hints(did_you_mean(name, self._asked), f"supported: {listed(self._asked)}")
+            self.fail(f"unknown parameter '{name}' of {self.kind} '{self.type}'", name, hint)
+
+
+def _float(value: Real) -> float:
+    """`value` in double precision; infinite when it is beyond that."""
+    try:
+        return float(value)
+    except OverflowError:
+        return np.inf
+
+
+def _range(minimum: float, maximum: float, open_interval: bool) -> str:
+    if np.isinf(minimum) and np.isinf(maximum):
+        return "finite"
+    if np.isinf(maximum):
+        return f"finite and {'>' if open_interval else '>='} {minimum:g}"
+    return f"in {'(' if open_interval else '['}{minimum:g}, {maximum:g}{')' if open_interval else ']'}"

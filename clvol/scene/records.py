@@ -1,0 +1,176 @@
+"""What a scene is once it is read: plain frozen records, in double precision, in world space.
+
+The loader makes them, `Features.from_scene` inspects them, `upload` turns them into device buffers.
+Nothing here knows Mitsuba's syntax or OpenCL.  All 4x4 matrices are float64 arrays that map column
+vectors from local to world space (``world = M @ local``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from clvol.volumes.grid import Grid
+
+Spectrum = tuple[float, ...]
+"""One number (grey) or three (linear sRGB)."""
+
+
+@dataclass(frozen=True)
+class ReconstructionFilter:
+    """Pixel filter; `radius` and `stddev` in pixels (stddev only for the Gaussian)."""
+
+    kind: str = "gaussian"  # "box" | "tent" | "gaussian"
+    radius: float = 2.0
+    stddev: float = 0.5
+
+
+@dataclass(frozen=True)
+class Film:
+    """Image size in pixels and the filter each pixel is integrated with."""
+
+    width: int = 768
+    height: int = 576
+    rfilter: ReconstructionFilter = ReconstructionFilter()
+    sample_border: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Perspective:
+    """Pinhole camera looking along local +z; local +x is the image's left (look_at convention).
+
+    `fov` in degrees is along `fov_axis`: "x", "y", "diagonal", "smaller" or "larger".
+    `principal_point_offset` is relative to the film size, as in Mitsuba.
+    """
+
+    to_world: np.ndarray
+    fov: float
+    fov_axis: str = "x"
+    near_clip: float = 1e-2
+    far_clip: float = 1e4
+    principal_point_offset: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class ConstVolume:
+    """The same value at every point of the unit cube under `to_world` (4x4, local to world)."""
+
+    value: Spectrum
+    to_world: np.ndarray = field(default_factory=lambda: np.eye(4))
+
+
+@dataclass(frozen=True, eq=False)
+class GridVolume:
+    """A sampled field in the world.
+
+    `index_to_world` (4x4) maps the grid's index space, where sample (i, j, k) sits at the point
+    (i, j, k), to the world.  The field is defined on the index-space box `lower`..`upper`
+    (float64 (3,), x y z); for a cell-centred gridvolume that is -½ .. n-½.
+    """
+
+    grid: Grid
+    index_to_world: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    filter_type: str = "trilinear"  # "trilinear" | "nearest"
+    wrap_mode: str = "clamp"  # "clamp" | "repeat" | "mirror": values outside lower..upper
+    clipped: bool = True  # False: a vdb whose background is not 0 reaches beyond its box
+    source: str = ""  # file and grid, for messages
+
+
+Volume = ConstVolume | GridVolume
+
+
+@dataclass(frozen=True)
+class Phase:
+    """Phase function: "isotropic", or "hg" (Henyey–Greenstein) with mean cosine g."""
+
+    kind: str = "isotropic"
+    g: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Medium:
+    """Participating medium: sigma_t(x) = scale · sigma_t volume, sigma_s = albedo · sigma_t.
+
+    A `homogeneous` medium fills its shape; a heterogeneous one is clipped to the box of its
+    sigma_t volume as well.
+    """
+
+    sigma_t: Volume
+    albedo: Volume
+    scale: float = 1.0
+    phase: Phase = Phase()
+    homogeneous: bool = True
+    sample_emitters: bool = True
+    name: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """Closed surface that bounds a medium: "cube" (−1..1)³ or the unit "sphere", under `to_world`."""
+
+    kind: str
+    to_world: np.ndarray
+    interior: Medium | None = None
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class ConstantEmitter:
+    """Environment of the same radiance in every direction."""
+
+    radiance: Spectrum = (1.0,)
+
+
+@dataclass(frozen=True, eq=False)
+class EnvmapEmitter:
+    """Lat-long environment.  `radiance`: float32 (height, width, 3), linear, scale included."""
+
+    radiance: np.ndarray
+    to_world: np.ndarray
+    source: str = ""
+
+
+@dataclass(frozen=True)
+class DirectionalEmitter:
+    """Parallel light from infinity.  `direction` (unit) is where the light travels to."""
+
+    irradiance: Spectrum
+    direction: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class PointEmitter:
+    """Isotropic point light of radiant `intensity` at a world `position`."""
+
+    intensity: Spectrum
+    position: tuple[float, float, float]
+
+
+Emitter = ConstantEmitter | EnvmapEmitter | DirectionalEmitter | PointEmitter
+
+
+@dataclass(frozen=True)
+class Integrator:
+    """Path length limits, and the estimator choices a scene may carry (names to strings)."""
+
+    max_depth: int = -1  # −1: no limit; 1: directly visible emitters only (Mitsuba's count)
+    rr_depth: int = 5
+    hide_emitters: bool = False
+    choices: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything a render needs.  Made by `clvol.load_file` or `clvol.load_dict`."""
+
+    sensor: Perspective
+    film: Film
+    integrator: Integrator
+    shapes: tuple[Shape, ...] = ()
+    emitters: tuple[Emitter, ...] = ()
+    spp: int = 4
+    seed: int = 0
+    source: str = ""  # file the scene came from, for messages and metadata

@@ -1,0 +1,119 @@
+"""4x4 matrices that map column vectors from local to world space, composed with ``@``.
+
+They are plain float64 arrays; anything with a 4x4 ``.matrix`` (as ``mi.ScalarTransform4f``) serves as well.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from clvol.errors import SceneError
+
+
+def translate(v: ArrayLike) -> np.ndarray:
+    """Translation by `v` (3 numbers, or one for all axes)."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = _vector(v, "translate")
+    return matrix
+
+
+def scale(v: ArrayLike) -> np.ndarray:
+    """Scaling by `v` (3 factors, or one for all axes)."""
+    return np.diag([*_vector(v, "scale"), 1.0])
+
+
+def rotate(axis: ArrayLike, angle_degrees: float) -> np.ndarray:
+    """Rotation about `axis` through the origin, counter-clockwise for an eye the axis points at.
+
+    The axis may have any length but zero (Mitsuba does not normalise it, and then does not rotate).
+    """
+    direction = _vector(axis, "rotate: axis")
+    length = np.linalg.norm(direction)
+    if length == 0:
+        raise SceneError("rotate: the axis is zero", hint="give a direction such as (0, 1, 0)")
+    x, y, z = direction / length
+    angle = np.deg2rad(_number(angle_degrees, "rotate: angle"))
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    matrix = np.eye(4)
+    # Rodrigues' formula.
+    matrix[:3, :3] += np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
+    return matrix
+
+
+def look_at(origin: ArrayLike, target: ArrayLike, up: ArrayLike) -> np.ndarray:
+    """Camera-to-world matrix at `origin` with local +z towards `target` and local +y near `up`.
+
+    The columns are left (up x dir), up, dir, origin, as in Mitsuba: local +x is the image's left.
+
+    Raises
+    ------
+    SceneError
+        When origin and target coincide, or `up` is zero or parallel to the view direction.
+    """
+    eye, to, above = (
+        _vector(v, f"look_at: {name}") for v, name in ((origin, "origin"), (target, "target"), (up, "up"))
+    )
+    distance = np.linalg.norm(to - eye)
+    if distance == 0:
+        raise SceneError("look_at: origin and target are the same point")
+    forward = (to - eye) / distance
+    left = np.cross(above, forward)
+    length = np.linalg.norm(left)
+    if length <= 1e-9 * np.linalg.norm(above):
+        raise SceneError(
+            "look_at: up is zero or parallel to the view direction", hint="choose another up vector"
+        )
+    left /= length
+    matrix = np.eye(4)
+    matrix[:3] = np.stack([left, np.cross(forward, left), forward, eye], axis=1)
+    return matrix
+
+
+def as_matrix(value: object) -> np.ndarray:
+    """`value` (4x4 array, or an object with a 4x4 ``.matrix``) as an invertible, affine float64 matrix.
+
+    Raises
+    ------
+    SceneError
+        Not a 4x4 matrix of finite numbers, a last row other than 0 0 0 1, or singular.
+    """
+    try:
+        matrix = np.array(getattr(value, "matrix", value), dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        matrix = np.empty(0)
+    if matrix.shape != (4, 4):
+        raise SceneError(
+            "expected a transform: a 4x4 array, or an object with a 4x4 .matrix",
+            hint="clvol.look_at, translate, scale and rotate make them",
+        )
+    if not np.isfinite(matrix).all():
+        raise SceneError("the transform is not finite")
+    if not np.array_equal(matrix[3], [0, 0, 0, 1]):
+        raise SceneError("the transform's last row must be 0 0 0 1 (no projections)")
+    singular_values = np.linalg.svd(matrix[:3, :3], compute_uv=False)
+    if singular_values[-1] <= 1e-12 * singular_values[0]:
+        raise SceneError("the transform is singular: it flattens space", hint="look for a scale factor of 0")
+    return matrix
+
+
+def _vector(value: ArrayLike, what: str) -> np.ndarray:
+    try:
+        vector = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        vector = np.empty(0)
+    if vector.shape == ():
+        vector = np.full(3, vector)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise SceneError(f"{what}: expected three finite numbers, got {value!r}")
+    return vector
+
+
+def _number(value: float, what: str) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = np.nan
+    if not np.isfinite(number):
+        raise SceneError(f"{what}: expected a finite number, got {value!r}")
+    return number

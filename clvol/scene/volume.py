@@ -1,0 +1,115 @@
+"""Volumes: fields of coefficients and where their samples lie in the world."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clvol.scene.files import find_parameter
+from clvol.scene.reader import Reader
+from clvol.scene.records import ConstVolume, GridVolume, Volume
+from clvol.scene.transforms import scale, translate
+from clvol.volumes import dense_from_array, read_vdb, read_volume
+from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
+
+FILTER_TYPES = ("trilinear", "nearest")
+WRAP_MODES = ("clamp", "repeat", "mirror")
+
+
+def constvolume(reader: Reader) -> ConstVolume:
+    """The `constvolume` plugin: one value."""
+    return ConstVolume(reader.color("value", 1.0), reader.transform())
+
+
+def vdbvolume(reader: Reader) -> GridVolume:
+    """The `vdbvolume` plugin: a grid of an OpenVDB file, under the grid's own transform."""
+    if not reader.has("filename"):
+        reader.fail("a vdbvolume needs a filename")
+    path = find_parameter(reader, "filename")
+    name = reader.string("grid", "density")
+    grids = reader.build.grids
+    key = (path.resolve(), name)
+    if key not in grids:
+        grids[key] = read_vdb(path, name)
+    grid = grids[key]
+    if not isinstance(grid, SparseGrid):
+        reader.fail(f"a vdbvolume reads OpenVDB, not '{path.name}'", "filename", "use a gridvolume")
+    return _sparse_volume(reader, grid)
+
+
+def gridvolume(reader: Reader) -> GridVolume:
+    """The `gridvolume` plugin: a file, or an array [z, y, x] or [z, y, x, channel].
+
+    Samples sit at the centres of equal cells of the unit cube (or of the file's own box) under
+    `to_world`; those of a .vdb file sit where a `vdbvolume` has them.
+    """
+    reader.ignore("accel", "raw")
+    wrap_mode = reader.string("wrap_mode", "clamp", WRAP_MODES)
+    use_box = reader.boolean("use_grid_bbox", False)
+    grid = _grid(reader)
+    if isinstance(grid, SparseGrid):
+        if wrap_mode != "clamp":
+            reader.fail(
+                "a sparse grid has no wrap_mode: outside its box is the background",
+                "wrap_mode",
+                "write it as .vol or .npy to repeat it",
+            )
+        return _sparse_volume(reader, grid)
+    size = np.array(grid.values.shape[2::-1], dtype=np.float64)
+    local = np.eye(4)
+    if use_box:
+        low, high = np.asarray(grid.box, dtype=np.float64)
+        if not (np.isfinite(grid.box).all() and (high > low).all()):
+            reader.fail(f"the file's bounding box {grid.box.tolist()} has no volume", "use_grid_bbox")
+        local = translate(low) @ scale(high - low)
+    index_to_world = reader.transform() @ local @ scale(1 / size) @ translate(0.5)
+    filter_type = reader.string("filter_type", "trilinear", FILTER_TYPES)
+    return GridVolume(
+        grid, index_to_world, np.full(3, -0.5), size - 0.5, filter_type, wrap_mode, source=grid.source
+    )
+
+
+def _grid(reader: Reader) -> Grid:
+    """The samples of a gridvolume, from the one source it gives; each file is read once per scene."""
+    # `grid` is the name of a grid when it is a string (in files that hold several), else an array.
+    name = None
+    if reader.has("grid") and isinstance(reader.node["grid"], str):
+        name = reader.string("grid", "")
+    sources = [key for key in ("filename", "data") if reader.has(key)]
+    sources += ["grid"] if reader.has("grid") and name is None else []
+    if len(sources) != 1:
+        reader.fail(
+            f"a gridvolume needs one of filename, grid (array) and data (array), got {len(sources)}",
+            hint=" and ".join(sources),
+        )
+    if sources != ["filename"]:
+        place = reader.node.place(sources[0])
+        return dense_from_array(reader.array(sources[0]), source=place)
+    path = find_parameter(reader, "filename")
+    grids = reader.build.grids
+    key = (path.resolve(), name or ("density" if path.suffix == ".vdb" else None))
+    if key not in grids:
+        grids[key] = read_volume(path, key[1])
+    return grids[key]
+
+
+def _sparse_volume(reader: Reader, grid: SparseGrid) -> GridVolume:
+    """A sparse grid in the world: its box is the active box plus one sample on each side."""
+    return GridVolume(
+        grid,
+        reader.transform() @ grid.index_to_world,
+        grid.active_box[0] - 1.0,
+        grid.active_box[1] + 1.0,
+        reader.string("filter_type", "trilinear", FILTER_TYPES),
+        clipped=grid.background == 0,
+        source=f"{grid.source}:{grid.name}" if grid.name not in grid.source else grid.source,
+    )
+
+
+def largest_value(volume: Volume) -> float:
+    """Upper bound of a volume's values in every channel; NaN when it holds one."""
+    if isinstance(volume, ConstVolume):
+        return max(volume.value)
+    if isinstance(volume.grid, DenseGrid):
+        return float(volume.grid.values.max())
+    parts = (volume.grid.leaf_values, volume.grid.tile_values, np.array([volume.grid.background]))
+    return float(max(part.max() for part in parts if part.size))

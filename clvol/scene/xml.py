@@ -1,0 +1,307 @@
+"""Mitsuba 3 XML to the nodes that the same dicts give: defaults, includes, paths, transforms, values.
+
+What plugins and parameters mean is not known here; how XML writes numbers, colours and matrices is.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from clvol.errors import SceneError
+from clvol.scene import transforms
+from clvol.scene.files import find
+from clvol.scene.nodes import Node
+from clvol.scene.vocabulary import did_you_mean, join_hints, listed
+from clvol.scene.xml_tree import Element, parse_elements
+from clvol.scene.xml_values import (
+    fail,
+    parse_float,
+    parse_floats,
+    parse_integer,
+    parse_rgb,
+    parse_spectrum,
+    parse_xyz,
+)
+
+PLUGIN_TAGS = (
+    *("scene", "shape", "bsdf", "medium", "volume", "phase", "emitter"),
+    *("sensor", "film", "rfilter", "sampler", "integrator", "texture"),
+)
+VALUE_TAGS = ("float", "integer", "boolean", "string", "rgb", "spectrum", "point", "vector")
+OTHER_TAGS = ("transform", "default", "include", "path", "ref")
+TRANSFORM_TAGS = ("translate", "scale", "rotate", "lookat", "matrix")
+
+MAX_TEXT = 2**20
+"""Longest attribute after its $names are replaced: defaults made of defaults can grow without end."""
+MAX_FILES = 1000
+"""Most files one scene may include, counted as often as they are."""
+_NAMELESS = "_arg_"
+_REFERENCE = re.compile(r"(?<!\\)\$(\w*)", re.ASCII)
+
+
+def read_xml(path: Path, keywords: Mapping[str, object]) -> Node:
+    """The scene in XML file `path`, with `keywords` in place of its defaults.
+
+    Raises
+    ------
+    SceneError
+        With file and line.
+    """
+    if not path.is_file():
+        raise SceneError(f"scene file '{path}' does not exist")
+    reader = _XmlReader(keywords)
+    root = reader.file(path, [], "")
+    if root.kind != "scene":
+        raise SceneError(f"the root element must be <scene>, not <{root.kind}>", root.where)
+    unused = sorted(set(keywords) - reader.used)
+    if unused:
+        names = sorted(set(reader.values) - set(keywords) | reader.used)
+        raise SceneError(
+            f"no ${unused[0]} in the scene uses the value given for '{unused[0]}'",
+            str(path),
+            join_hints(did_you_mean(unused[0], names), f"the scene's names: {listed(names)}"),
+        )
+    return root
+
+
+class _XmlReader:
+    """State of one scene's reading: the values of $names, which were used, and the files being read."""
+
+    def __init__(self, keywords: Mapping[str, object]) -> None:
+        self.values = {name: _as_text(value) for name, value in keywords.items()}
+        self.used: set[str] = set()
+        self.reading: list[Path] = []
+        self.files = 0
+
+    # -- files -------------------------------------------------------------------------------------
+
+    def file(self, path: Path, folders: list[Path], included_at: str) -> Node:
+        """The root node of a file; `folders` are those of the file that includes it."""
+        resolved = path.resolve()
+        if resolved in self.reading:
+            raise SceneError(f"'{path}' includes itself", included_at)
+        self.files += 1
+        if self.files > MAX_FILES:
+            raise SceneError(f"the scene includes more than {MAX_FILES} files", included_at)
+        self.reading.append(resolved)
+        element = parse_elements(path)
+        if element.tag not in PLUGIN_TAGS:
+            fail(element, f"unknown element <{element.tag}>", "a scene file begins with <scene>")
+        attributes = self.attributes(element, "type", "id", "name", "version")
+        version = attributes.get("version", "")
+        if not re.fullmatch(r"[23]\.\d+(\.\d+)?", version, re.ASCII):
+            what = f"version '{version}' is not supported" if version else "the version is missing"
+            fail(element, what, f'write <{element.tag} version="3.0.0">')
+        node = self.plugin(element, [path.parent, *folders])
+        self.reading.pop()
+        return node
+
+    def include(self, element: Element, parent: Node) -> None:
+        """Put the children of an included <scene>, or another included plugin, into `parent`."""
+        attributes = self.attributes(element, "!filename", "name")
+        path = find(attributes["filename"], parent.folders, element.where)
+        node = self.file(path, parent.folders, element.where)
+        if node.kind != "scene":
+            _add_child(parent, attributes.get("name", ""), node)
+            return
+        for key, value in node.parameters():
+            nameless = key.startswith(_NAMELESS)
+            if isinstance(value, Node) and nameless:
+                _add_child(parent, "", value)
+            else:
+                parent.add(key, value, node.place(key))
+
+    # -- elements ----------------------------------------------------------------------------------
+
+    def attributes(self, element: Element, *allowed: str) -> dict[str, str]:
+        """An element's attributes with $names replaced; a "!" marks those that must be there."""
+        names = [name.lstrip("!") for name in allowed]
+        for name in element.attributes:
+            if name not in names:
+                hint = join_hints(did_you_mean(name, names), f"supported: {listed(names)}")
+                fail(element, f"unknown attribute '{name}' of <{element.tag}>", hint)
+        for name in allowed:
+            if name.startswith("!") and name[1:] not in element.attributes:
+                fail(element, f"<{element.tag}> needs the attribute '{name[1:]}'")
+        return {name: self.substitute(text, element) for name, text in element.attributes.items()}
+
+    def substitute(self, text: str, element: Element) -> str:
+        """`text` with each $name replaced by its value, and each \\$ by a dollar sign."""
+
+        length = 0
+
+        def value(match: re.Match[str]) -> str:
+            nonlocal length
+            # As in Mitsuba the longest known name wins: $width2 may be $width followed by a 2.
+            word = match[1]
+            name = next((word[:end] for end in range(len(word), 0, -1) if word[:end] in self.values), None)
+            if name is None:
+                hint = join_hints(did_you_mean(word, self.values), f"known: {listed(self.values)}")
+                fail(element, f"${word} has no value", hint)
+            self.used.add(name)
+            length += len(self.values[name])
+            if length > MAX_TEXT:
+                fail(element, f"the text is longer than {MAX_TEXT} characters once ${name} is replaced")
+            return self.values[name] + word[len(name) :]
+
+        return _REFERENCE.sub(value, text).replace("\\$", "$")
+
+    def plugin(self, element: Element, folders: list[Path]) -> Node:
+        """A plugin's node with everything inside it."""
+        if element.tag == "scene":
+            attributes = {"type": "scene"} | self.attributes(element, "version", "id", "name")
+        else:
+            attributes = self.attributes(element, "!type", "id", "name", "version")
+        node = Node(element.where, element.tag, attributes.get("id", ""), folders)
+        node.add("type", attributes["type"], element.where)
+        for child in element.children:
+            self.child(child, node)
+        return node
+
+    def child(self, element: Element, parent: Node) -> None:
+        """Add what one element inside a plugin says to the plugin's node."""
+        tag = element.tag
+        if tag in PLUGIN_TAGS[1:]:
+            node = self.plugin(element, parent.folders)
+            _add_child(parent, self.substitute(element.attributes.get("name", ""), element), node)
+        elif tag in VALUE_TAGS:
+            _no_children(element)
+            name, value = self.value(element)
+            parent.add(name, value, element.where)
+        elif tag == "transform":
+            name = self.attributes(element, "!name")["name"]
+            parent.add(name, self.transform(element), element.where)
+        elif tag == "ref":
+            _no_children(element)
+            attributes = self.attributes(element, "!id", "name")
+            node = Node(element.where)
+            node.add("type", "ref", element.where)
+            node.add("id", attributes["id"], element.where)
+            _add_child(parent, attributes.get("name", ""), node)
+        elif tag == "include":
+            _no_children(element)
+            self.include(element, parent)
+        elif tag in ("default", "path"):
+            _no_children(element)
+            self.directive(element, parent)
+        else:
+            tags = (*PLUGIN_TAGS[1:], *VALUE_TAGS, *OTHER_TAGS)
+            fail(element, f"unknown element <{tag}>", join_hints(did_you_mean(tag, tags), _only_inside(tag)))
+
+    def directive(self, element: Element, parent: Node) -> None:
+        """<default> sets a $name that has no value yet; <path> adds a folder to look for files in."""
+        if element.tag == "default":
+            attributes = self.attributes(element, "!name", "!value")
+            if not re.fullmatch(r"\w+", attributes["name"], re.ASCII):
+                fail(
+                    element,
+                    f"'{attributes['name']}' cannot be the name of a default",
+                    "use letters, digits, _",
+                )
+            self.values.setdefault(attributes["name"], attributes["value"])
+            return
+        folder = self.attributes(element, "!value")["value"]
+        if parent.kind != "scene":
+            fail(element, "<path> belongs directly into <scene>")
+        found = [base / folder for base in parent.folders if (base / folder).is_dir()]
+        if not found:
+            fail(element, f"folder '{folder}' does not exist", "paths are relative to the scene file")
+        parent.folders.insert(0, found[0])
+
+    # -- values ------------------------------------------------------------------------------------
+
+    def value(self, element: Element) -> tuple[str, object]:
+        """(name, value) of a <float>, <integer>, …, <vector>."""
+        tag = element.tag
+        if tag in ("point", "vector"):
+            attributes = self.attributes(element, "!name", "value", "x", "y", "z")
+            return attributes["name"], parse_xyz(element, attributes)
+        attributes = self.attributes(element, "!name", "!value")
+        name, text = attributes["name"], attributes["value"]
+        if tag == "float":
+            return name, parse_float(element, text)
+        if tag == "integer":
+            return name, parse_integer(element, text)
+        if tag == "boolean":
+            if text.lower() not in ("true", "false"):
+                fail(element, f"'{text}' is not a boolean", "write true or false")
+            return name, text.lower() == "true"
+        if tag == "string":
+            return name, text
+        node = Node(element.where)
+        node.add("type", tag, element.where)
+        node.add(
+            "value",
+            parse_rgb(element, text) if tag == "rgb" else parse_spectrum(element, text),
+            element.where,
+        )
+        return name, node
+
+    def transform(self, element: Element) -> np.ndarray:
+        """The 4x4 matrix of a <transform>: its operations, later ones applied after earlier ones."""
+        matrix = np.eye(4)
+        for child in element.children:
+            _no_children(child)
+            try:
+                matrix = self.operation(child) @ matrix
+            except SceneError as error:
+                raise error if error.where else SceneError(error.what, child.where, error.hint) from None
+        return matrix
+
+    def operation(self, element: Element) -> np.ndarray:
+        """One step of a transform."""
+        tag = element.tag
+        if tag == "translate":
+            return transforms.translate(
+                parse_xyz(element, self.attributes(element, "value", "x", "y", "z"), 0.0)
+            )
+        if tag == "scale":
+            return transforms.scale(parse_xyz(element, self.attributes(element, "value", "x", "y", "z"), 1.0))
+        if tag == "rotate":
+            attributes = self.attributes(element, "!angle", "value", "x", "y", "z")
+            return transforms.rotate(
+                parse_xyz(element, attributes, 0.0), parse_float(element, attributes["angle"])
+            )
+        if tag == "lookat":
+            attributes = self.attributes(element, "!origin", "!target", "!up")
+            return transforms.look_at(
+                *(parse_floats(element, attributes[name], (3,)) for name in ("origin", "target", "up"))
+            )
+        if tag == "matrix":
+            numbers = parse_floats(element, self.attributes(element, "!value")["value"], (9, 16))
+            matrix = np.eye(4)
+            side = 3 if len(numbers) == 9 else 4
+            matrix[:side, :side] = np.reshape(numbers, (side, side))
+            return matrix
+        hint = join_hints(did_you_mean(tag, TRANSFORM_TAGS), f"supported: {listed(TRANSFORM_TAGS)}")
+        fail(element, f"unknown transform <{tag}>", hint)
+
+
+def _add_child(parent: Node, name: str, node: Node) -> None:
+    """Add a plugin or ref under its name, or under its id or a made-up one when it has none."""
+    if not name:
+        number = sum(1 for key in parent if key.startswith(_NAMELESS))
+        name = f"{_NAMELESS}{number}"
+    parent.add(name, node, node.where)
+
+
+def _no_children(element: Element) -> None:
+    if element.children:
+        fail(element.children[0], f"<{element.children[0].tag}> cannot be inside <{element.tag}>")
+
+
+def _only_inside(tag: str) -> str:
+    return f"<{tag}> belongs into a <transform>" if tag in TRANSFORM_TAGS else ""
+
+
+def _as_text(value: object) -> str:
+    """A keyword's value as XML would write it."""
+    if isinstance(value, bool | np.bool_):
+        return "true" if value else "false"
+    if isinstance(value, list | tuple | np.ndarray):
+        return ", ".join(_as_text(part) for part in value)
+    return str(value)

@@ -1,0 +1,210 @@
+"""A prepared scene in device buffers: media, volumes, majorants, lights, filter.
+
+World positions are relative to the scene's centre, taken in double before they become floats.
+Volumes are written brick chunk by brick chunk, so that the host never holds a second copy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import pyopencl as cl
+
+from clvol import layout
+from clvol.accel.kdtree import pack_maximum
+from clvol.config import KernelConfig, is_clipped, is_homogeneous, scene_media
+from clvol.device import Device
+from clvol.environment import envmap_distribution, luminance
+from clvol.errors import DeviceError
+from clvol.film import filter_cdf
+from clvol.prepare import PreparedScene
+from clvol.scene import records
+from clvol.volumes.bricks import BRICK_SAMPLES
+
+
+def upload_scene(device: Device, prepared: PreparedScene, config: KernelConfig) -> dict[str, cl.Buffer]:
+    """Buffers of every scene argument that `config` needs, by argument name."""
+    volumes = {key: number for number, key in enumerate(prepared.volumes)}
+    emitters = emitter_order(prepared.scene)
+    buffers: dict[str, cl.Buffer] = {}
+    needed = {argument.name for argument in layout.arguments(config)}
+    if "volumes" in needed:
+        buffers |= _volume_buffers(device, prepared)
+    if "media" in needed:
+        buffers["media"] = _buffer(device, _media(prepared, volumes))
+    if "majorants" in needed:
+        grids = [b.maximum * np.float32(m.scale) for m, b in _heterogeneous(prepared)]
+        buffers["majorants"] = _buffer(device, np.concatenate([g.reshape(-1) for g in grids]))
+    if "kd_nodes" in needed:
+        trees = [_scaled_nodes(prepared.trees[id(m)].nodes, m.scale) for m, _ in _heterogeneous(prepared)]
+        buffers["kd_nodes"] = _buffer(device, np.concatenate(trees))
+    if "emitters" in needed:
+        buffers["emitters"] = _buffer(device, _emitters(prepared, emitters))
+    if "envmap" in needed:
+        buffers |= _envmap_buffers(device, emitters[0])
+    if "filter_cdf" in needed:
+        buffers["filter_cdf"] = _buffer(device, filter_cdf(prepared.scene.film.rfilter))
+    return buffers
+
+
+def _buffer(device: Device, array: np.ndarray) -> cl.Buffer:
+    flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
+    return cl.Buffer(device.context, flags, hostbuf=np.ascontiguousarray(array))
+
+
+def rows_3x4(matrix: np.ndarray) -> np.ndarray:
+    """The affine part of a 4x4 matrix as 12 floats."""
+    return matrix[:3].astype(np.float32).reshape(12)
+
+
+def _rgb(value: tuple[float, ...]) -> np.ndarray:
+    return np.broadcast_to(np.asarray(value, np.float64), 3)
+
+
+def _heterogeneous(prepared: PreparedScene) -> Iterable:
+    """(medium, bounds) of the media that have a volume, in the order of the records."""
+    return [(m, prepared.bounds[id(m)]) for m in scene_media(prepared.scene) if not is_homogeneous(m)]
+
+
+def _scaled_nodes(nodes: np.ndarray, scale: float) -> np.ndarray:
+    """kd nodes with their leaves' extrema in coefficients; scaled up and down so that they stay bounds."""
+    nodes = nodes.copy()
+    leaf = (nodes[:, 0] & 3) == 3
+    empty = leaf & (nodes[:, 0] == 3)
+    high = nodes[leaf, 0].view(np.float32) * np.float32(scale)
+    high[empty[leaf]] = 0
+    nodes[leaf, 0] = pack_maximum(high)
+    low = nodes[leaf, 1].view(np.float32) * np.float32(scale)
+    nodes[leaf, 1] = np.nextafter(low, np.float32(0)).view(np.uint32)
+    return nodes
+
+
+def _volume_buffers(device: Device, prepared: PreparedScene) -> dict[str, cl.Buffer]:
+    """Records, top grids and the brick pool of every volume."""
+    table = np.zeros(len(prepared.volumes), layout.VOLUME)
+    tops, brick_offset, top_offset = [], 0, 0
+    for record, volume in zip(table, prepared.volumes.values(), strict=True):
+        bricks = volume.bricks
+        record["world_to_index"] = rows_3x4(volume.world_to_index)
+        record["size"], record["channels"] = bricks.size, bricks.channels
+        record["bricks"] = bricks.top.shape[::-1]
+        record["top_offset"], record["brick_offset"] = top_offset, brick_offset
+        record["nearest"] = int(volume.volume.filter_type == "nearest")
+        # numbers count bricks of `channels` × 729 floats; in the pool all count in 729 floats
+        tops.append(bricks.top.reshape(-1) * np.int32(bricks.channels))
+        top_offset += bricks.top.size
+        brick_offset += bricks.brick_count * bricks.channels
+    pool_bytes = brick_offset * BRICK_SAMPLES * 4
+    if pool_bytes > device.max_buffer_bytes:
+        raise DeviceError(
+            f"the volumes need a buffer of {pool_bytes / 2**20:.0f} MiB, "
+            f"{device.description} allows {device.max_buffer_bytes / 2**20:.0f} MiB",
+            hint="use a device with more memory, or a volume of lower resolution",
+        )
+    pool = cl.Buffer(device.context, cl.mem_flags.READ_ONLY, pool_bytes)
+    for record, volume in zip(table, prepared.volumes.values(), strict=True):
+        channels = volume.bricks.channels
+
+        def sink(first: int, samples: np.ndarray, base: int = int(record["brick_offset"]), c: int = channels) -> None:
+            if samples.size:
+                at = (base + first * c) * BRICK_SAMPLES * 4
+                cl.enqueue_copy(device.queue, pool, samples, dst_offset=at, is_blocking=True)
+
+        volume.bricks.write(sink)
+    return {"volumes": _buffer(device, table), "tops": _buffer(device, np.concatenate(tops)), "bricks": pool}
+
+
+def _media(prepared: PreparedScene, volumes: dict[int, int]) -> np.ndarray:
+    """One Medium record per bounding shape."""
+    shapes = [s for s in prepared.scene.shapes if s.interior is not None]
+    table = np.zeros(len(shapes), layout.MEDIUM)
+    cell_offset = kd_root = 0
+    for record, shape in zip(table, shapes, strict=True):
+        medium = shape.interior
+        record["shape_from_world"] = rows_3x4(_from_centred(shape.to_world, prepared.centre))
+        record["shape_kind"] = layout.enum("SHAPE", shape.kind)
+        record["homogeneous"] = int(is_homogeneous(medium))
+        record["clipped"] = int(is_clipped(medium))
+        record["phase_kind"] = layout.enum("PHASE", medium.phase.kind)
+        record["phase_g"] = medium.phase.g
+        record["sample_emitters"] = int(medium.sample_emitters)
+        record["sigma_t_volume"] = volumes.get(id(medium.sigma_t), -1)
+        record["albedo_volume"] = volumes.get(id(medium.albedo), -1)
+        if isinstance(medium.albedo, records.ConstVolume):
+            record["albedo"] = _rgb(medium.albedo.value)
+        if is_homogeneous(medium):
+            record["sigma_t"] = _rgb(medium.sigma_t.value) * medium.scale
+            record["box_from_world"] = rows_3x4(_from_centred(medium.sigma_t.to_world, prepared.centre))
+            record["box_upper"] = 1.0
+            continue
+        bounds, volume = prepared.bounds[id(medium)], prepared.volumes[id(medium.sigma_t)]
+        to_brick = volume.world_to_index @ _centred(medium.sigma_t.index_to_world, prepared.centre)
+        record["sigma_t"] = medium.scale
+        record["box_from_world"] = rows_3x4(volume.world_to_index)
+        record["box_lower"] = (to_brick @ [*medium.sigma_t.lower, 1.0])[:3]
+        record["box_upper"] = (to_brick @ [*medium.sigma_t.upper, 1.0])[:3]
+        record["majorant"] = np.float32(bounds.maximum.max()) * np.float32(medium.scale)
+        record["cells"], record["cell_size"] = bounds.cells, bounds.cell_size
+        record["cell_offset"], record["kd_root"] = cell_offset, kd_root
+        cell_offset += bounds.maximum.size
+        kd_root += len(prepared.trees[id(medium)].nodes) if id(medium) in prepared.trees else 0
+    return table
+
+
+def _centred(to_world: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    matrix = to_world.copy()
+    matrix[:3, 3] -= centre
+    return matrix
+
+
+def _from_centred(to_world: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    return np.linalg.inv(_centred(to_world, centre))
+
+
+def emitter_order(scene: records.Scene) -> list[records.Emitter]:
+    """Emitters with the environment, if any, first: the device looks for it there."""
+    environments = (records.ConstantEmitter, records.EnvmapEmitter)
+    return sorted(scene.emitters, key=lambda e: not isinstance(e, environments))
+
+
+def _emitters(prepared: PreparedScene, emitters: list[records.Emitter]) -> np.ndarray:
+    """Emitter records; next-event estimation picks them by the power they send through the scene's sphere."""
+    table = np.zeros(len(emitters), layout.EMITTER)
+    power = np.zeros(len(emitters))
+    disc = np.pi * prepared.radius**2
+    for i, (record, emitter) in enumerate(zip(table, emitters, strict=True)):
+        match emitter:
+            case records.ConstantEmitter():
+                value, power[i] = emitter.radiance, 4 * np.pi * disc
+            case records.EnvmapEmitter():
+                value, power[i] = (float(luminance(emitter.radiance).mean()),), 4 * np.pi * disc
+            case records.DirectionalEmitter():
+                value, power[i] = emitter.irradiance, disc
+                record["vector"] = emitter.direction
+            case records.PointEmitter():
+                value, power[i] = emitter.intensity, 4 * np.pi
+                record["vector"] = np.asarray(emitter.position) - prepared.centre
+        record["kind"] = layout.enum("EMITTER", type(emitter).__name__.removesuffix("Emitter"))
+        record["value"] = _rgb(value)
+        power[i] *= float(luminance(_rgb(value)))
+    total = power.sum()
+    table["select_pdf"] = power / total if total > 0 else 1.0 / len(power)
+    return table
+
+
+def _envmap_buffers(device: Device, emitter: records.EnvmapEmitter) -> dict[str, cl.Buffer]:
+    record = np.zeros(1, layout.ENVMAP)
+    rotation = np.eye(4)
+    rotation[:3, :3] = emitter.to_world[:3, :3]
+    record["world_from_env"] = rows_3x4(rotation)
+    record["env_from_world"] = rows_3x4(np.linalg.inv(rotation))
+    height, width, _ = emitter.radiance.shape
+    record["size"] = width, height
+    marginal, conditional = envmap_distribution(emitter.radiance)
+    return {
+        "envmap": _buffer(device, record),
+        "env_texels": _buffer(device, emitter.radiance.astype(np.float32)),
+        "env_marginal": _buffer(device, marginal),
+        "env_conditional": _buffer(device, conditional),
+    }

@@ -1,0 +1,27 @@
+"""Volume files and arrays to sampled fields on the host (`grid`): OpenVDB, Mitsuba .vol, NumPy.
+
+Readers live here, with the checks that broken and hostile files need; brick maps, majorants and the
+device do not.
+"""
+
+from clvol.volumes.check import check_coefficients
+from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
+from clvol.volumes.numpy_files import dense_from_array, read_numpy
+from clvol.volumes.read import read_volume
+from clvol.volumes.vdb import VdbGridInfo, list_vdb, read_vdb
+from clvol.volumes.vol import read_vol, write_vol
+
+__all__ = [
+    "DenseGrid",
+    "Grid",
+    "SparseGrid",
+    "VdbGridInfo",
+    "check_coefficients",
+    "dense_from_array",
+    "list_vdb",
+    "read_numpy",
+    "read_vdb",
+    "read_vol",
+    "read_volume",
+    "write_vol",
+]

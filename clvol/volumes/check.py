@@ -1,0 +1,65 @@
+"""Whether samples can be coefficients of a medium: finite, not negative, and there at all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from clvol.errors import VolumeError
+from clvol.volumes.files import place
+from clvol.volumes.grid import DenseGrid, Grid
+
+# Samples looked at together: the largest temporary is one mask of them.
+SLAB = 1 << 22
+
+
+def check_coefficients(grid: Grid, what: str = "density") -> None:
+    """Raise VolumeError unless every sample is finite and ≥ 0 and there is at least one.
+
+    Parameters
+    ----------
+    grid : dense, or sparse with at least one active voxel; of a sparse one every voxel of the
+        leaves (interpolation reads inactive ones too), the tiles and the background are checked.
+    what : the coefficient the samples are used for, as the message names it.
+    """
+    where = place(grid.source, grid.name)
+    if isinstance(grid, DenseGrid):
+        if grid.values.size == 0:
+            raise VolumeError(f"{what} has no samples", where)
+    elif grid.active_voxels == 0:
+        raise VolumeError(f"{what} has no active voxels", where, "choose another grid or file")
+    total = broken = negative = 0
+    lowest = 0.0
+    for slab in _slabs(grid):
+        total += slab.size
+        low, high = slab.min(), slab.max()
+        if low >= 0 and np.isfinite(high):
+            continue
+        broken += slab.size - np.count_nonzero(np.isfinite(slab))
+        below = (slab < 0) & np.isfinite(slab)
+        negative += np.count_nonzero(below)
+        lowest = min(lowest, float(slab.min(where=below, initial=0.0)))
+    faults = []
+    if broken:
+        faults.append(f"{broken} NaN or infinite")
+    if negative:
+        faults.append(f"{negative} negative (minimum {lowest:.6g})")
+    if faults:
+        raise VolumeError(
+            f"{what} has {' and '.join(faults)} of {total} samples",
+            where,
+            "coefficients must be finite and at least 0: repair or clamp the data",
+        )
+
+
+def _slabs(grid: Grid) -> Iterator[np.ndarray]:
+    """Every stored sample, in flat views of at most SLAB."""
+    if isinstance(grid, DenseGrid):
+        stores = [grid.values]
+    else:
+        stores = [grid.leaf_values, grid.tile_values, np.array([grid.background], np.float32)]
+    for store in stores:
+        flat = store.reshape(-1)
+        for first in range(0, flat.size, SLAB):
+            yield flat[first : first + SLAB]

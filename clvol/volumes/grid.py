@@ -1,0 +1,64 @@
+"""Sampled fields on the host, as read from files: dense arrays or sparse 8³ leaves.
+
+Both put sample (i, j, k) at the integer index position (i, j, k), x first; where those positions
+lie in the world is the business of the volume that uses the grid.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class DenseGrid:
+    """Samples on a full lattice.
+
+    `values` is float32 (nz, ny, nx, channels), C order, possibly a read-only memory map; sample
+    (i, j, k) is ``values[k, j, i]``.  `box` is the file's own bounding box, float64
+    (2, 3) in x, y, z order (the unit cube where a format has none).
+    """
+
+    values: np.ndarray
+    box: np.ndarray
+    name: str = ""
+    source: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class SparseGrid:
+    """Samples of an OpenVDB tree: 8³ leaves and constant tiles over a background.
+
+    leaf_origins : int32 (n, 3), x y z index of each leaf's first sample, multiples of 8.
+    leaf_values : float32 (n, 8, 8, 8), indexed [leaf, z, y, x]; inactive voxels hold their stored value.
+    leaf_active : uint8 (n, 64), bit mask of active voxels, bit order as in OpenVDB (x slowest).
+    tile_origins : int32 (m, 3); tile_sizes : int32 (m,), edge in samples, a multiple of 8.
+    tile_values : float32 (m,); tile_active : bool (m,).
+    background : value everywhere else.
+    index_to_world : float64 (4, 4) for column vectors: the grid's own transform.
+    active_box : int32 (2, 3), inclusive lower and upper index of the active samples (tiles included).
+    """
+
+    leaf_origins: np.ndarray
+    leaf_values: np.ndarray
+    leaf_active: np.ndarray
+    tile_origins: np.ndarray
+    tile_sizes: np.ndarray
+    tile_values: np.ndarray
+    tile_active: np.ndarray
+    background: float
+    index_to_world: np.ndarray
+    active_box: np.ndarray
+    name: str = "density"
+    source: str = ""
+
+    @property
+    def active_voxels(self) -> int:
+        """Number of active samples, those inside active tiles included."""
+        in_leaves = int(np.bitwise_count(self.leaf_active).sum(dtype=np.int64))
+        in_tiles = int((self.tile_sizes[self.tile_active].astype(np.int64) ** 3).sum())
+        return in_leaves + in_tiles
+
+
+Grid = DenseGrid | SparseGrid

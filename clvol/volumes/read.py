@@ -1,0 +1,38 @@
+"""Any supported volume file, by its suffix."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from clvol.errors import VolumeError
+from clvol.volumes.grid import Grid
+from clvol.volumes.numpy_files import read_numpy
+from clvol.volumes.vdb import read_vdb
+from clvol.volumes.vol import read_vol
+
+SUPPORTED = (".vdb", ".vol", ".npy", ".npz")
+
+
+def read_volume(path: str | os.PathLike[str], grid: str | None = None) -> Grid:
+    """Read a volume file; its suffix, in either case, says the format.
+
+    Parameters
+    ----------
+    path : .vdb, .vol, .npy or .npz.
+    grid : the grid of a .vdb (default "density") or the array of a .npz (default the only one).
+
+    Raises VolumeError as the reader of the format does, and for other suffixes.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix == ".vdb":
+        return read_vdb(path) if grid is None else read_vdb(path, grid)
+    if suffix in (".npy", ".npz"):
+        return read_numpy(path, grid)
+    if suffix != ".vol":
+        hint = "convert it to OpenVDB" if suffix == ".nvdb" else ""
+        listed = f"{', '.join(SUPPORTED[:-1])} and {SUPPORTED[-1]}"
+        raise VolumeError(f"files ending in {suffix!r} cannot be read, {listed} can", str(path), hint)
+    if grid is not None:
+        raise VolumeError(f"a .vol file has no grid named {grid!r}", str(path), "leave the name out")
+    return read_vol(path)

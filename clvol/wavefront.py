@@ -1,0 +1,259 @@
+"""The wavefront: path slots, queues, and the schedule that keeps the device busy.
+
+Jobs (one sample of one pixel each) are numbered; a free slot takes the next number.  A *pass* is a run
+of jobs that gives every pixel the same number of samples; its results stand in a ring buffer and are
+added to the film once all of them have arrived, in the order of the samples.  Several passes are in
+flight together, so that no slot waits for a pass to end.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pyopencl as cl
+
+from clvol import layout
+from clvol.config import KernelConfig
+from clvol.device import Device
+
+NO_JOB = 0xFFFFFFFF
+_NEXT_JOB, _JOB_LIMIT, _NON_FINITE, _DONE = (layout.enum("CONTROL", n) for n in layout.ENUMS["CONTROL"])
+_MAX_ROUND_JOBS = 1 << 31
+_BATCH_SECONDS = 0.02
+"""Waves are launched in batches of about this length; between batches the host reads the counters."""
+
+
+@dataclass(frozen=True)
+class Pool:
+    """How many paths are in flight and how many jobs a pass holds (at least one sample per pixel)."""
+
+    slots: int
+    pass_jobs: int
+    ring_passes: int = 4
+
+    @classmethod
+    def for_device(cls, device: Device, config: KernelConfig, slots: int | None = None) -> Pool:
+        """Pool for a device; `slots` is rounded up to whole groups."""
+        if slots is None:
+            slots = 8192 if device.is_cpu else 1 << 20
+        groups = max(1, -(-slots // config.group_slots))
+        slots = groups * config.group_slots
+        return cls(slots, pass_jobs=max(1 << 17, 4 * slots))
+
+
+@dataclass
+class Progressed:
+    """What the schedule reports between batches."""
+
+    samples_done: int
+    seconds: float
+
+
+class Wavefront:
+    """Runs one render: buffers of state, queues and film on one device, and the launch loop.
+
+    Parameters
+    ----------
+    kernels : stage name to kernel, `accumulate` included.
+    buffers : scene buffers by argument name.
+    render : the Render record, without its schedule fields.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        config: KernelConfig,
+        kernels: dict[str, cl.Kernel],
+        buffers: dict[str, cl.Buffer],
+        render: np.ndarray,
+        pool: Pool,
+    ) -> None:
+        self.device, self.config, self.kernels, self.pool = device, config, kernels, pool
+        self.render = render
+        self.pixels = int(render["film_size"][0, 0]) * int(render["film_size"][0, 1])
+        self.pass_samples = max(1, pool.pass_jobs // self.pixels)
+        self.groups = pool.slots // config.group_slots
+        self.fields = layout.path_fields(config)
+        self.stride = pool.slots + 16  # off the power of two, or all fields of a slot share a cache set
+        self.seconds = dict.fromkeys((*config.stages, "accumulate"), 0.0)
+        self.launches = self.waves = 0
+        self.film = np.zeros((self.pixels, config.channels, 4), np.float32)
+        self._allocate(buffers)
+
+    def _allocate(self, scene_buffers: dict[str, cl.Buffer]) -> None:
+        ring_jobs = self.pass_samples * self.pixels * self.pool.ring_passes
+        sizes = {
+            "render": self.render.nbytes,
+            "state": 4 * len(self.fields) * self.stride,
+            "queues": 4 * len(layout.ENUMS["QUEUE"]) * self.pool.slots,
+            "counts": 4 * layout.COUNTER_STRIDE * self.groups,
+            "control": 4 * (_DONE + self.pool.ring_passes),
+            "results": 4 * self.config.channels * ring_jobs,
+            "result_lookups": 4 * ring_jobs,
+        }
+        self.buffers = {name: self._buffer(size) for name, size in sizes.items()} | scene_buffers
+        self.bytes = sum(sizes.values()) + sum(b.size for b in scene_buffers.values())
+        self.film_buffer = self._buffer(self.film.nbytes)
+        self.film_lookups = self._buffer(8 * self.pixels)
+        for buffer, size in ((self.film_buffer, self.film.nbytes), (self.film_lookups, 8 * self.pixels)):
+            cl.enqueue_fill_buffer(self.device.queue, buffer, np.uint32(0), 0, size)
+        state = np.zeros((len(self.fields), self.stride), np.uint32)
+        state[[f.name for f in self.fields].index("job")] = NO_JOB
+        self._write("state", state)
+        values = [
+            np.uint32(self.stride) if argument.name == "slot_stride" else self.buffers[argument.name]
+            for argument in layout.arguments(self.config)
+        ]
+        for stage in self.config.stages:
+            self.kernels[stage].set_args(*values)
+
+    def _buffer(self, size: int) -> cl.Buffer:
+        return cl.Buffer(self.device.context, cl.mem_flags.READ_WRITE, max(size, 4))
+
+    def _write(self, name: str, array: np.ndarray, offset: int = 0) -> None:
+        cl.enqueue_copy(self.device.queue, self.buffers[name], array, dst_offset=offset, is_blocking=True)
+
+    def run(
+        self,
+        first: int,
+        count: int,
+        should_stop: Callable[[], bool],
+        report: Callable[[Progressed], None],
+    ) -> int:
+        """Render samples `first` .. `first + count` of every pixel; return how many were done.
+
+        `should_stop` is asked between batches; once it says yes no new pass is begun, and the passes in
+        flight are finished, never dropped (dropping would favour short paths).
+        """
+        done = 0
+        start = time.perf_counter()
+        per_round = max(1, _MAX_ROUND_JOBS // (self.pass_samples * self.pixels)) * self.pass_samples
+        while done < count and not (done and should_stop()):
+            part = min(count - done, per_round)
+            finished = self._run_round(first + done, part, should_stop, lambda n, base=done: report(
+                Progressed(base + n, time.perf_counter() - start)
+            ))
+            done += finished
+            if finished < part:
+                break
+        return done
+
+    def _run_round(
+        self, first: int, count: int, should_stop: Callable[[], bool], report: Callable[[int], None]
+    ) -> int:
+        """One numbering of jobs: fewer than 2³¹ of them."""
+        passes = -(-count // self.pass_samples)
+        samples = [self.pass_samples] * passes
+        samples[-1] = count - (passes - 1) * self.pass_samples
+        pass_jobs = self.pass_samples * self.pixels
+        self._start_round(first, pass_jobs, passes - 1, samples[-1])
+        begun = finished = 0
+        waves = 1
+        while True:
+            if not (begun and should_stop()):
+                allowed = min(passes, finished + self.pool.ring_passes)
+            else:
+                allowed = begun
+            limit = sum(samples[:allowed]) * self.pixels
+            self._write("control", np.array([limit], np.uint32), 4 * _JOB_LIMIT)
+            elapsed = self._launch(waves)
+            waves = int(np.clip(waves * _BATCH_SECONDS / max(elapsed, 1e-6), 1, max(2 * waves, 4)))
+            control = self._read_control()
+            begun = min(allowed, -(-int(control[_NEXT_JOB]) // pass_jobs))
+            arrived = control[_DONE:]
+            while finished < begun and arrived[finished % self.pool.ring_passes] == samples[finished] * self.pixels:
+                self._accumulate(finished % self.pool.ring_passes, samples[finished])
+                finished += 1
+                report(sum(samples[:finished]))
+            if finished == passes or (finished == begun and begun and should_stop()):
+                return sum(samples[:finished])
+
+    def _start_round(self, first: int, pass_jobs: int, last_pass: int, last_samples: int) -> None:
+        self.render["first_sample"], self.render["pass_samples"] = first, self.pass_samples
+        self.render["pass_jobs"], self.render["ring_passes"] = pass_jobs, self.pool.ring_passes
+        self.render["last_pass"], self.render["last_samples"] = last_pass, last_samples
+        self._write("render", self.render)
+        self._write("control", np.zeros(_DONE + self.pool.ring_passes, np.uint32))
+        counts = np.zeros((self.groups, layout.COUNTER_STRIDE), np.uint32)
+        counts[:, layout.enum("QUEUE", "GENERATE")] = self.config.group_slots
+        self._write("counts", counts)
+        queues = np.zeros((self.groups, len(layout.ENUMS["QUEUE"]), self.config.group_slots), np.uint32)
+        slots = np.arange(self.pool.slots, dtype=np.uint32).reshape(self.groups, -1)
+        queues[:, layout.enum("QUEUE", "GENERATE")] = slots
+        self._write("queues", queues)
+
+    def _launch(self, waves: int) -> float:
+        """Run `waves` waves; return the seconds they took on the device, and book them by stage."""
+        queue, size = self.device.queue, (self.groups * self.config.local_size,)
+        local = (self.config.local_size,)
+        events = [
+            (stage, cl.enqueue_nd_range_kernel(queue, self.kernels[stage], size, local))
+            for _ in range(waves)
+            for stage in self.config.stages
+        ]
+        self.launches += len(events)
+        self.waves += waves
+        events[-1][1].wait()
+        total = 0.0
+        for stage, event in events:
+            seconds = 1e-9 * (event.profile.end - event.profile.start)
+            self.seconds[stage] += seconds
+            total += seconds
+        return total
+
+    def _read_control(self) -> np.ndarray:
+        control = np.empty(_DONE + self.pool.ring_passes, np.uint32)
+        cl.enqueue_copy(self.device.queue, control, self.buffers["control"], is_blocking=True)
+        return control
+
+    def _accumulate(self, ring_pass: int, samples: int) -> None:
+        """Add one finished pass to the film and free its place in the ring."""
+        names = ("results", "result_lookups")
+        local = 64
+        event = self.kernels["accumulate"](
+            self.device.queue,
+            (-(-self.pixels // local) * local,),
+            (local,),
+            *(self.buffers[name] for name in names),
+            self.film_buffer,
+            self.film_lookups,
+            self.buffers["control"],
+            np.uint32(ring_pass),
+            np.uint32(self.pass_samples * self.pixels),
+            np.uint32(samples),
+            np.uint32(self.pixels),
+        )
+        event.wait()
+        self.launches += 1
+        self.seconds["accumulate"] += 1e-9 * (event.profile.end - event.profile.start)
+        self._write("control", np.zeros(1, np.uint32), 4 * (_DONE + ring_pass))
+
+    def sums(self) -> tuple[np.ndarray, np.ndarray]:
+        """Sums of the samples and of their squares so far, float64 (pixels, channels)."""
+        cl.enqueue_copy(self.device.queue, self.film, self.film_buffer, is_blocking=True)
+        film = self.film.astype(np.float64)
+        return film[..., 0] + film[..., 1], film[..., 2] + film[..., 3]
+
+    def lookups(self) -> np.ndarray:
+        """Density look-ups so far, uint64 (pixels,)."""
+        lookups = np.empty(self.pixels, np.uint64)
+        cl.enqueue_copy(self.device.queue, lookups, self.film_lookups, is_blocking=True)
+        return lookups
+
+    def slot_statistics(self) -> dict[str, float]:
+        """Statistics that slots count for themselves, summed over the slots."""
+        state = np.empty((len(self.fields), self.stride), np.uint32)
+        cl.enqueue_copy(self.device.queue, state, self.buffers["state"], is_blocking=True)
+        totals = {}
+        for field, row in zip(self.fields, state[:, : self.pool.slots], strict=True):
+            if field.name in layout.SLOT_STATISTICS:
+                values = row.view(np.float32) if field.kind == "f" else row
+                totals[field.name] = values.sum(dtype=np.float64).item()
+        return totals
+
+    def non_finite(self) -> int:
+        """Samples that were NaN or infinite."""
+        return int(self._read_control()[_NON_FINITE])
