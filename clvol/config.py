@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from clvol import registry
 from clvol.scene import records
 
 
@@ -133,7 +134,8 @@ class KernelConfig:
     @property
     def nee(self) -> bool:
         """Next-event estimation: there are lights to sample and media that scatter towards them."""
-        return self.features.samples_lights and self.features.scattering
+        f = self.features
+        return self.transmittance != "none" and f.samples_lights and f.scattering
 
     @property
     def mis(self) -> bool:
@@ -183,7 +185,7 @@ class KernelConfig:
             "CLVOL_HIDE_EMITTERS": int(f.hide_emitters),
             "CLVOL_NEE": int(self.nee),
             "CLVOL_MIS": int(self.mis),
-            "CLVOL_ABSORPTION_BY_WEIGHT": int(self.absorption == "weight"),
+            "CLVOL_ABSORPTION": tuple(registry.ABSORPTIONS).index(self.absorption),
         }
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from clvol import registry
 from clvol.config import KernelConfig
 
 _C_TYPES = {"f": "float", "i": "int", "u": "uint"}
@@ -107,6 +108,7 @@ ENUMS = {
     "EMITTER": ("CONSTANT", "ENVMAP", "DIRECTIONAL", "POINT"),
     "QUEUE": ("GENERATE", "INTERSECT", "MEDIUM", "SHADE", "SHADOW"),
     "EVENT": ("IDLE", "ESCAPE", "COLLISION"),
+    "ABSORPTION": tuple(registry.ABSORPTIONS),
     "CONTROL": ("NEXT_JOB", "JOB_LIMIT", "NON_FINITE", "DONE"),  # DONE: one counter per pass in the ring
 }
 COUNTER_STRIDE = 16  # queue counters of a group, padded to a cache line
@@ -114,7 +116,7 @@ COUNTER_STRIDE = 16  # queue counters of a group, padded to a cache line
 
 def enum(family: str, name: str) -> int:
     """Device constant ``FAMILY_NAME``."""
-    return ENUMS[family].index(name.upper())
+    return [n.upper() for n in ENUMS[family]].index(name.upper())
 
 
 @dataclass(frozen=True)
@@ -233,7 +235,7 @@ def layout_text(config: KernelConfig) -> str:
     """OpenCL text of every record, enum, path-state accessor and the stage argument list."""
     parts = [record_text(name, dtype) for name, dtype in RECORDS.items()]
     for family, names in ENUMS.items():
-        parts += [f"#define {family}_{name} {value}" for value, name in enumerate(names)]
+        parts += [f"#define {family}_{name.upper()} {value}" for value, name in enumerate(names)]
     parts += [f"#define QUEUE_COUNT {len(ENUMS['QUEUE'])}", f"#define COUNTER_STRIDE {COUNTER_STRIDE}u"]
     args = arguments(config)
     parts.append("typedef struct {\n" + "\n".join(f"    {a.c_type} {a.name};" for a in args) + "\n} Scene;")

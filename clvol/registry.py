@@ -25,6 +25,7 @@ TECHNIQUES = {
 }
 TRANSMITTANCES = {
     "ratio": Choice("ratio tracking: product of null-collision probabilities", "tracking/ratio.h"),
+    "none": Choice("no next-event estimation: environments are found by scattering alone"),
 }
 MAJORANTS = {
     "global": Choice("one bound for the whole medium", "majorant/global.h"),
@@ -37,6 +38,7 @@ LOOKUPS = {
 ABSORPTIONS = {
     "sample": Choice("a collision absorbs the path with probability sigma_a / sigma_t"),
     "weight": Choice("a collision multiplies the path's weight by the albedo"),
+    "mixed": Choice("by weight while the path's weight is above 1/2, sampled below"),
 }
 
 FAMILIES = {

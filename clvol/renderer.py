@@ -274,10 +274,19 @@ class Session:
 
 def kernel_config(prepared: PreparedScene, choices: dict[str, str], device: Device) -> KernelConfig:
     """Resolve `auto` by fixed rules and tune the launch for the kind of device."""
-    fixed = {"technique": "delta", "transmittance": "ratio", "lookup": "exact", "absorption": "sample"}
+    features = prepared.features
+    fixed = {"technique": "delta", "transmittance": "ratio", "lookup": "exact", "absorption": "mixed"}
+    if not (features.envmap or features.directional or features.point_lights):
+        # scattering finds a constant environment as well as sampling it does, without the shadow ray
+        fixed["transmittance"] = "none"
     resolved = {k: choices[k] if choices[k] != "auto" else v for k, v in fixed.items()}
+    if resolved["transmittance"] == "none" and (features.directional or features.point_lights):
+        raise OptionError(
+            "transmittance 'none' cannot render point and directional lights",
+            hint="only next-event estimation reaches them: use ratio",
+        )
     tuning = {"local_size": 1, "group_slots": 256} if device.is_cpu else {"local_size": 128, "group_slots": 1024}
-    return KernelConfig(prepared.features, majorant=prepared.majorant, **resolved, **tuning)
+    return KernelConfig(features, majorant=prepared.majorant, **resolved, **tuning)
 
 
 def render_record(prepared: PreparedScene, seed: int) -> np.ndarray:

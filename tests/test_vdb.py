@@ -1,4 +1,4 @@
-"""The OpenVDB reader gives what OpenVDB wrote: real files' figures, and every way the format stores a value."""
+"""The OpenVDB reader gives what OpenVDB wrote: real files' figures, every way a value is stored."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ INACTIVE = {0: [2], 1: [-2], 2: [1], 3: [2, -2], 4: [2, 1], 5: [1, 3], 6: [1, 2,
 
 
 def rich_grid(**options) -> GridSpec:
-    """Leaves with each code of inactive values, a full and an empty one, tiles of 8³ and 128³; background 2."""
+    """Leaves with each code of inactive values, a full and an empty one, tiles 8³ and 128³; background 2."""
     spec = GridSpec(background=2, **options)
     for code, inactive in INACTIVE.items():
         spec.leaves[(-16 + 8 * code, 0, -4104)] = leaf(inactive, code, spec.letter)
@@ -221,7 +221,9 @@ def test_inactive_values_of_half_grids_keep_full_width(tmp_path):
 def test_active_box_is_that_of_active_samples_only(tmp_path):
     values, active = np.ones((8, 8, 8)), np.zeros((8, 8, 8), bool)
     active[1:3, 4, 5:7] = True
-    spec = GridSpec(leaves={(-8, 0, 8): (values, active)}, tiles=[((800, 0, 0), 8, 1, False)])
+    nothing = np.zeros((8, 8, 8), bool)
+    leaves = {(-8, 0, 8): (values, active), (-80, 0, 0): (values, nothing), (80, 0, 0): (values, nothing)}
+    spec = GridSpec(leaves=leaves, tiles=[((800, 0, 0), 8, 1, False)])
     write_vdb(tmp_path / "a.vdb", [spec])
     assert spans(read_vdb(tmp_path / "a.vdb").active_box) == [[-7, 4, 13], [-6, 4, 14]]
     spec.tiles.append(((-128, 128, 0), 128, 1, True))

@@ -1,4 +1,4 @@
-"""Broken and hostile OpenVDB files end in one clear error: never a crash, a hang, or memory beyond the limit."""
+"""Broken and hostile OpenVDB files end in one clear error: no crash, no hang, no memory beyond the limit."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from vdb_writer import ACTIVE_MASK, BLOSC, MAGIC, ZIP, GridSpec, write_vdb
 from clvol.errors import VolumeError
 from clvol.volumes import check_coefficients, list_vdb, read_vdb
 from clvol.volumes.vdb import find_grid
-from clvol.volumes.vdb_stream import decompress_blosc, decompress_zip, open_vdb
+from clvol.volumes.vdb_stream import VdbStream, decompress_blosc, decompress_zip, open_vdb
 
 FIRE = Path(__file__).resolve().parent.parent / "scenes" / "fire.vdb"
 DATA = os.environ.get("CLVOL_DATA")
@@ -48,6 +48,9 @@ def test_a_file_cut_anywhere_is_an_error(path, tmp_path):
     target = tmp_path / "cut.vdb"
     target.write_bytes(data)
     read_vdb(target)
+    os.truncate(target, len(data) - 1)
+    with pytest.raises(VolumeError, match=f"its last byte is {len(data)}, the file ends at {len(data) - 1}"):
+        read_vdb(target)
     places = random.Random(1)
     for length in sorted((places.randrange(len(data)) for _ in range(200)), reverse=True):
         os.truncate(target, length)
@@ -180,11 +183,24 @@ def test_a_zip_block_of_another_size_is_refused(raw):
         decompress_zip(zlib.compress(raw), 2048)
 
 
-def test_a_zip_block_with_a_wrong_checksum_is_refused():
+def test_a_zip_block_with_a_wrong_checksum_or_none_is_refused():
     packed = bytearray(zlib.compress(bytes(2048)))
+    with pytest.raises(ValueError, match="not 2048 bytes"):
+        decompress_zip(bytes(packed[:-4]), 2048)
     packed[-1] ^= 1
     with pytest.raises(ValueError, match="zlib"):
         decompress_zip(bytes(packed), 2048)
+
+
+@pytest.mark.parametrize("codec", [ZIP, BLOSC])
+def test_a_block_larger_than_any_compressor_makes_is_not_even_copied(codec):
+    stream = VdbStream(struct.pack("<q", 16 << 20) + bytes(16 << 20), "a.vdb")
+
+    def read():
+        with pytest.raises(VolumeError, match="takes 16777216 bytes compressed"):
+            stream.block(2048, codec)
+
+    assert peak_bytes(read) < 1 << 20
 
 
 # Lies in a small file: each field that a reader could trust too much.
@@ -259,6 +275,16 @@ def test_a_lie_is_named_and_costs_no_memory(tmp_path, lie):
         assert "\n" not in str(caught.value)
 
     assert peak_bytes(read) < 4 << 20
+
+
+def test_root_tiles_that_no_brick_map_can_index_are_refused(tmp_path):
+    path = tmp_path / "tiles.vdb"
+    far = [((4096 * i, 0, 0), 4096, 0, False) for i in range(1000)]
+    write_vdb(path, [GridSpec(tiles=[*far, ((0, 4096, 0), 4096, 1, True)])])
+    assert read_vdb(path).tile_origins.tolist() == [[0, 4096, 0]]
+    write_vdb(path, [GridSpec(tiles=[(*tile[:3], True) for tile in far])])
+    with pytest.raises(VolumeError, match=r"1000 root tiles of 4096³ samples span 134217728000 bricks"):
+        read_vdb(path)
 
 
 def test_an_unknown_code_of_inactive_values_is_named(tmp_path):

@@ -1,4 +1,4 @@
-"""Dense volume files and arrays become the samples they hold, or one clear error; coefficients are checked."""
+"""Volume files and arrays become the samples they hold, or one clear error; coefficients are checked."""
 
 from __future__ import annotations
 

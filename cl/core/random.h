@@ -23,14 +23,17 @@ typedef struct {
 /* Philox4x32 with 7 rounds (Salmon et al. 2011, the fewest that pass BigCrush). */
 INLINE uint4 philox4x32(uint4 counter, uint2 key)
 {
-    for (int round = 0; round < 7; ++round) {
-        const ulong p0 = (ulong)counter.x * 0xD2511F53u;
-        const ulong p1 = (ulong)counter.z * 0xCD9E8D57u;
-        counter = (uint4)((uint)(p1 >> 32) ^ counter.y ^ key.x, (uint)p1,
-                          (uint)(p0 >> 32) ^ counter.w ^ key.y, (uint)p0);
-        key += (uint2)(0x9E3779B9u, 0xBB67AE85u);
+    uint a = counter.x, b = counter.y, c = counter.z, d = counter.w, k0 = key.x, k1 = key.y;
+    for (int round = 0; round < 7; ++round) { /* in scalars: as vectors it costs twice as much on PoCL */
+        const ulong p0 = (ulong)a * 0xD2511F53u, p1 = (ulong)c * 0xCD9E8D57u;
+        a = (uint)(p1 >> 32) ^ b ^ k0;
+        b = (uint)p1;
+        c = (uint)(p0 >> 32) ^ d ^ k1;
+        d = (uint)p0;
+        k0 += 0x9E3779B9u;
+        k1 += 0xBB67AE85u;
     }
-    return counter;
+    return (uint4)(a, b, c, d);
 }
 
 /* Four numbered dimensions, full 32-bit.  `interval` tells apart the walks of one bounce. */

@@ -75,10 +75,8 @@ INLINE void start_job(const Scene *scene, uint slot, uint job)
                                               y * load_vector(render->camera_base_dy)));
 #if CLVOL_ONE_CHANNEL_PER_PATH
     set_path_channel(scene, slot, (uint)(((ulong)k.z * 3u) >> 32));
-    set_beta(scene, slot, 3.0f);
-#else
-    set_beta(scene, slot, (Spectrum)(1.0f));
 #endif
+    set_beta(scene, slot, (Spectrum)(FIRST_WEIGHT));
     set_radiance(scene, slot, (Spectrum)(0.0f));
     set_path_pixel(scene, slot, key.pixel);
     set_path_sample(scene, slot, key.sample);

@@ -11,7 +11,7 @@ import numpy as np
 
 from clvol.accel.bounds import Bounds
 
-CELL_COST = 0.18
+CELL_COST = 0.085
 """Crossing a grid cell, in look-ups (measured on PoCL by tools/bench.py --costs)."""
 NODE_COST = 0.45
 """Visiting a kd-tree leaf or inner node on the way down, in look-ups (measured likewise)."""

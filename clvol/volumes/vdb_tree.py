@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import struct
 from dataclasses import dataclass
+from typing import NoReturn
 
 import numpy as np
 
@@ -148,24 +148,31 @@ class VdbTree:
             stream.fail(f"the background is {background}")
         self.nodes = NodeValues(stream, self.code, self.half, self.compression, background)
         tiles, children = stream.unpack("<II")
-        tile = struct.Struct(f"<3i{self.code}?")
-        stream.require(tiles * tile.size + children * 12)
-        self.claim(0, tiles)
-        root_tiles = [stream.unpack(tile.format) for _ in range(tiles)]
-        seen: set[tuple[int, ...]] = set()
-        for *origin, _, _ in root_tiles:
-            self.check_root_origin(tuple(origin), seen)
-        if root_tiles:
-            self.add_tiles(
-                np.array([tile[:3] for tile in root_tiles], np.int32),
-                ROOT_CHILD_EDGE,
-                np.array([tile[3] for tile in root_tiles], np.float64).astype(np.float32),
-                np.array([tile[4] for tile in root_tiles], bool),
-            )
+        seen = self.read_root_tiles(tiles)
+        stream.require(children * 12)
         for _ in range(children):
             origin = stream.unpack("<3i")
             self.check_root_origin(origin, seen)
             self.read_internal(np.array(origin, np.int32), 128)
+
+    def read_root_tiles(self, count: int) -> set[tuple[int, ...]]:
+        """Keep the root's tiles, those of inactive background aside; their origins."""
+        record = np.dtype([("origin", "<i4", 3), ("value", "<" + self.code), ("active", "?")])
+        self.stream.require(count * record.itemsize)
+        self.claim(0, count)
+        table = np.frombuffer(self.stream.take(count * record.itemsize), record)
+        with np.errstate(over="ignore"):
+            values = table["value"].astype(np.float32)
+        kept = np.flatnonzero(table["active"] | (values != self.background))
+        bricks = kept.size * (ROOT_CHILD_EDGE // LEAF_EDGE) ** 3
+        if bricks * BRICK_BYTES > self.max_bytes:
+            self.fail_extent(f"{kept.size} root tiles of {ROOT_CHILD_EDGE}³ samples", bricks)
+        origins, seen = table["origin"][kept], set()
+        for origin in origins.tolist():
+            self.check_root_origin(tuple(origin), seen)
+        if kept.size:
+            self.add_tiles(origins, ROOT_CHILD_EDGE, values[kept], table["active"][kept])
+        return seen
 
     def check_root_origin(self, origin: tuple[int, ...], seen: set[tuple[int, ...]]) -> None:
         """Fail if `origin` is off the root's lattice, absurdly far out or taken already."""
@@ -214,11 +221,14 @@ class VdbTree:
         extent = [int(size) for size in ends.max(axis=0) - corners.min(axis=0)]
         bricks = extent[0] * extent[1] * extent[2] // LEAF_VOXELS
         if bricks * BRICK_BYTES > self.max_bytes:
-            self.stream.fail(
-                f"leaves and tiles span {' x '.join(map(str, extent))} samples, "
-                f"{bricks} bricks of 8³: more than the limit of {self.max_bytes} bytes can index",
-                "the file is damaged, or has stray voxels far away: prune them, or raise max_bytes",
-            )
+            self.fail_extent(f"leaves and tiles over {' x '.join(map(str, extent))} samples", bricks)
+
+    def fail_extent(self, what: str, bricks: int) -> NoReturn:
+        """Fail because `what` covers too many bricks."""
+        self.stream.fail(
+            f"{what} span {bricks} bricks of 8³: more than the limit of {self.max_bytes} bytes can index",
+            "the file is damaged, or has stray voxels far away: prune them, or raise max_bytes",
+        )
 
     def read_leaves(self) -> None:
         """Values and masks of all leaves, in the order of their origins."""

@@ -1,0 +1,69 @@
+"""Statistical tests with a stated false-alarm rate.
+
+Every test that calls these raises a false alarm with probability FALSE_ALARM at most, over all its
+comparisons together (Šidák); seeds are fixed, so that a test that passes keeps passing.
+"""
+
+import numpy as np
+from scipy import stats
+
+FALSE_ALARM = 1e-4
+
+
+def sidak(alpha, comparisons):
+    """Level of each of several independent comparisons that keeps their joint rate at alpha."""
+    return -np.expm1(np.log1p(-alpha) / comparisons)
+
+
+def chi2_p_value(observed, expected, least=10.0):
+    """p-value of counts against expected counts; bins with fewer than `least` expected are pooled.
+
+    A count where nothing at all is expected is impossible: p = 0.
+    """
+    observed, expected = np.asarray(observed, float), np.asarray(expected, float)
+    if observed[expected <= 0].any():
+        return 0.0
+    order = np.argsort(expected)
+    groups = np.minimum(np.cumsum(expected[order]) // least, 1e9).astype(int)
+    _, group = np.unique(groups, return_inverse=True)
+    o, e = np.bincount(group, observed[order]), np.bincount(group, expected[order])
+    if len(o) > 1 and e[-1] < least:
+        o[-2:-1] += o[-1]
+        e[-2:-1] += e[-1]
+        o, e = o[:-1], e[:-1]
+    if len(o) < 2:
+        return 1.0
+    statistic = ((o - e) ** 2 / e).sum()
+    return float(stats.chi2.sf(statistic, len(o) - 1))
+
+
+def z_score(mean, variance_of_mean, reference, reference_variance=0.0):
+    """Deviation in standard errors; 0/0 counts as agreement."""
+    difference = np.asarray(mean, float) - reference
+    error = np.sqrt(np.asarray(variance_of_mean, float) + reference_variance)
+    return np.divide(difference, error, out=np.where(difference == 0, 0.0, np.inf) + 0 * difference, where=error > 0)
+
+
+def largest_z(comparisons, alpha=FALSE_ALARM):
+    """Two-sided bound on |z| over several comparisons with joint false-alarm rate alpha."""
+    return float(stats.norm.isf(sidak(alpha, comparisons) / 2))
+
+
+def tile_means(image, variance, tile):
+    """Means and their variances over square tiles of a (h, w, c) image: (tiles, c) each."""
+    h, w, c = image.shape
+    ny, nx = h // tile, w // tile
+    blocks = image[: ny * tile, : nx * tile].reshape(ny, tile, nx, tile, c).astype(float)
+    variances = variance[: ny * tile, : nx * tile].reshape(ny, tile, nx, tile, c).astype(float)
+    return blocks.mean((1, 3)).reshape(-1, c), variances.mean((1, 3)).reshape(-1, c) / tile**2
+
+
+def assert_same_picture(a, b, tile=8, alpha=FALSE_ALARM):
+    """Image mean and every tile of two independent Results agree."""
+    (ma, va), (mb, vb) = (tile_means(r.image, r.variance, tile) for r in (a, b))
+    z = z_score(ma, va, mb, vb)
+    assert np.abs(z).max() < largest_z(z.size, alpha / 2), f"a tile deviates by {np.abs(z).max():.2f} sigma"
+    count = a.image.shape[0] * a.image.shape[1]
+    pairs = [(r.image.astype(float).mean((0, 1)), r.variance.astype(float).sum((0, 1)) / count**2) for r in (a, b)]
+    z = z_score(pairs[0][0], pairs[0][1], pairs[1][0], pairs[1][1])
+    assert np.abs(z).max() < largest_z(z.size, alpha / 2), f"the image mean deviates by {np.abs(z).max():.2f} sigma"

@@ -1,0 +1,116 @@
+"""Efficiency of clvol beside Mitsuba's: both render the same scene by turns, in CPU time."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from bench_tables import Figures, against, ranged, show, thread_count
+from efficiency import Rounds, efficiencies, efficiency_ratio, image_mean, pixel_variance, spread, z_score
+from mitsuba_side import MitsubaSide
+from scene_options import OpenScene, open_scene
+
+from clvol.result import Result
+from clvol.version import __version__
+
+EFFICIENCY_TARGET = 8.0
+Z_LIMIT = 4.0
+"""Two correct programs differ by more in one run of 16,000."""
+
+
+def timed_render(opened: OpenScene, spp: int, seed: int) -> tuple[Result, float, float]:
+    """Result, CPU seconds and wall seconds of a render, kernels built and loaded before."""
+    session = opened.session(seed)
+    wall, cpu = time.perf_counter(), time.process_time()
+    done = session.run(0, spp, None, None, lambda: False)
+    result = session.result(0, done, 0.0)
+    return result, time.process_time() - cpu, time.perf_counter() - wall
+
+
+def samples_for(seconds: float, trial_spp: int, trial_seconds: float) -> int:
+    """Samples per pixel that take about `seconds`."""
+    return max(2, round(trial_spp * seconds / trial_seconds))
+
+
+def measure_cloud(
+    scene: str,
+    res: int,
+    rounds: int,
+    seconds: float,
+    python: str,
+    choices: dict[str, str],
+    device: str | None,
+) -> Figures:
+    """Render by turns; efficiency, means and their difference."""
+    cpu = time.process_time()
+    opened = open_scene(scene, {"res": res}, choices, device)
+    setup_cpu = time.process_time() - cpu
+    timed_render(opened, 1, 0)  # the first launch finishes the kernels' build
+    spp = samples_for(seconds, 16, timed_render(opened, 16, 0)[2])
+    ours: list[tuple[np.ndarray, float]] = []
+    theirs: list[tuple[np.ndarray, float]] = []
+    own_variance = []
+    with MitsubaSide(python, scene, {"res": str(res)}, thread_count()) as mitsuba:
+        mitsuba.render(1, 0)
+        mitsuba_spp = samples_for(seconds, 4, mitsuba.render(4, 0)[2])
+        for seed in range(1, rounds + 1):
+            result, cpu, _ = timed_render(opened, spp, seed)
+            ours.append((result.image, cpu))
+            own_variance.append(float(result.variance.mean(dtype=np.float64)) * spp)
+            theirs.append(mitsuba.render(mitsuba_spp, seed)[:2])
+    sides = {
+        "clvol": Rounds(np.stack([i for i, _ in ours]), np.array([c for _, c in ours]), spp),
+        "mitsuba": Rounds(np.stack([i for i, _ in theirs]), np.array([c for _, c in theirs]), mitsuba_spp),
+    }
+    figures: Figures = {name: _side_figures(side) for name, side in sides.items()}
+    figures["clvol"] |= {"version": __version__, "setup_cpu": setup_cpu}
+    figures["clvol"]["variance_by_pixel"] = float(np.mean(own_variance))
+    figures["mitsuba"] |= {"version": mitsuba.version, "setup_cpu": mitsuba.setup_cpu}
+    means = [(figures[name]["mean"], figures[name]["standard_error"]) for name in sides]
+    return figures | {
+        "rounds": rounds,
+        "ratio": efficiency_ratio(sides["clvol"], sides["mitsuba"]),
+        "z": z_score(*means),
+    }
+
+
+def _side_figures(side: Rounds) -> Figures:
+    mean, error = image_mean(side)
+    return {
+        "spp": side.spp,
+        "mean": mean,
+        "standard_error": error,
+        "variance": float(pixel_variance(side).mean()),
+        "cpu": spread(side.cpu),
+        "microseconds_per_path": spread(1e6 * side.cpu / side.paths),
+        "efficiency": spread(efficiencies(side)),
+    }
+
+
+def show_cloud(figures: Figures) -> None:
+    """Both sides, the ratio, and whether the pictures agree."""
+    sides = [figures["clvol"], figures["mitsuba"]]
+    rows = [
+        ("samples per pixel and round", *(str(s["spp"]) for s in sides)),
+        ("CPU seconds of a round", *(ranged(s["cpu"]) for s in sides)),
+        ("CPU microseconds per path", *(ranged(s["microseconds_per_path"]) for s in sides)),
+        ("variance per sample, between rounds", *(f"{s['variance']:.5f}" for s in sides)),
+        ("  as the program itself estimates it", f"{sides[0]['variance_by_pixel']:.5f}", "-"),
+        ("efficiency, 1/1000", *(ranged(s["efficiency"], 4) for s in sides)),
+        ("mean of the image", *(f"{s['mean']:.6f} ± {s['standard_error']:.6f}" for s in sides)),
+        ("CPU seconds to load and prepare, once", *(f"{s['setup_cpu']:.2f}" for s in sides)),
+    ]
+    names = [f"clvol {sides[0]['version']}", f"Mitsuba {sides[1]['version']} scalar_rgb"]
+    show(f"cloud: {figures['rounds']} rounds by turns, {thread_count()} threads", ["", *names], rows)
+    ratio = figures["ratio"]
+    print(
+        f"efficiency, clvol over Mitsuba: {ranged(ratio)} over rounds, 95 % interval {ratio['low']:.3g} to "
+        f"{ratio['high']:.3g}; {against(ratio['median'], EFFICIENCY_TARGET, at_least=True)}"
+    )
+    verdict = "they agree" if agrees(figures) else "THEY DIFFER"
+    print(f"difference of the means: z = {figures['z']:+.2f}, {verdict}")
+
+
+def agrees(figures: Figures) -> bool:
+    """Whether the two means differ by less than Z_LIMIT standard errors."""
+    return abs(figures["z"]) < Z_LIMIT

@@ -1,0 +1,65 @@
+"""What the tools share: options for a scene, and the scene prepared as `clvol render` does it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import click
+
+from clvol.cli_options import Definition, RegistryChoice
+from clvol.config import KernelConfig
+from clvol.device import Device, open_device
+from clvol.prepare import PreparedScene, prepare
+from clvol.registry import FAMILIES, check_choice
+from clvol.renderer import Session, kernel_config
+from clvol.scene import load_file
+
+
+@dataclass(frozen=True, eq=False)
+class OpenScene:
+    """A scene on the host, the choices for it, and the device it will be rendered on."""
+
+    device: Device
+    prepared: PreparedScene
+    choices: dict[str, str]
+
+    def config(self) -> KernelConfig:
+        """What is compiled for it."""
+        return kernel_config(self.prepared, self.choices, self.device)
+
+    def session(self, seed: int, pool: int | None = None) -> Session:
+        """Kernels built, scene uploaded, an empty film."""
+        return Session.open(self.device, self.prepared, self.choices, seed, pool)
+
+
+def open_scene(
+    path: str, defaults: dict[str, object], choices: dict[str, str], pattern: str | None = None
+) -> OpenScene:
+    """Load and prepare a scene; a choice of "auto" becomes the scene's own where it has one."""
+    scene = load_file(path, **defaults)
+    settled = {}
+    for family in FAMILIES:
+        value = choices.get(family, "auto")
+        value = scene.integrator.choices.get(family, "auto") if value == "auto" else value
+        settled[family] = check_choice(family, value)
+    return OpenScene(open_device(pattern), prepare(scene, settled["majorant"]), settled)
+
+
+def choice_options(command: Callable) -> Callable:
+    """One option for each family of choices in `clvol.registry`, and the device."""
+    device = click.option("--device", metavar="PATTERN", help="Part of the device's name; see clvol devices.")
+    command = device(command)
+    for family in reversed(FAMILIES):
+        command = click.option(f"--{family}", type=RegistryChoice(family), default="auto")(command)
+    return command
+
+
+definitions_option = click.option(
+    "-D",
+    "definitions",
+    type=Definition(),
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Fill $NAME in the scene.",
+)
