@@ -53,10 +53,13 @@ def camera_rays(sensor: Perspective, film: Film, centre: np.ndarray, radius: flo
     offset_x, offset_y = sensor.principal_point_offset
     # local +x is the image's left, local +y its top
     per_pixel = 2 * tangent / film.width
-    corner = np.array([tangent * (1 + 2 * offset_x), tangent * film.height / film.width + 2 * tangent * offset_y, 1.0])
+    half_height = tangent * film.height / film.width
+    corner = np.array([tangent + 2 * tangent * offset_x, half_height + 2 * tangent * offset_y, 1.0])
     base, dx, dy = linear @ corner, linear @ [-per_pixel, 0, 0], linear @ [0, -per_pixel, 0]
     forward = linear[:, 2] / np.linalg.norm(linear[:, 2])
     unit = float(base @ forward)  # depth of a ray at parameter 1; the same for every pixel
     depth = max(sensor.near_clip * unit, float(-eye @ forward) - radius)
     start = depth / unit
-    return CameraRays(eye + start * base, start * dx, start * dy, base, dx, dy, forward, sensor.far_clip * unit - depth)
+    return CameraRays(
+        eye + start * base, start * dx, start * dy, base, dx, dy, forward, sensor.far_clip * unit - depth
+    )

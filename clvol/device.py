@@ -11,7 +11,6 @@ import pyopencl as cl
 
 from clvol.errors import DeviceError
 
-
 _KINDS = ("GPU", "ACCELERATOR", "CPU")
 
 
@@ -30,7 +29,7 @@ class DeviceInfo:
     def matches(self, pattern: str) -> bool:
         """Whether `pattern` is the index, or part of the platform's or device's name (any case)."""
         text = f"{self.platform} {self.name} {self.kind}".lower()
-        return pattern.isdigit() and int(pattern) == self.index or pattern.lower() in text
+        return (pattern.isdigit() and int(pattern) == self.index) or pattern.lower() in text
 
 
 @dataclass(frozen=True, eq=False)

@@ -106,4 +106,6 @@ def build(device: Device, source: str, name: str) -> cl.Program:
 def build_stages(device: Device, config: KernelConfig) -> dict[str, cl.Kernel]:
     """One kernel object per stage of `config`, and `accumulate`."""
     names = (*config.stages, "accumulate")
-    return {name: cl.Kernel(build(device, stage_source(config, name), name), f"{name}_kernel") for name in names}
+    return {
+        name: cl.Kernel(build(device, stage_source(config, name), name), f"{name}_kernel") for name in names
+    }

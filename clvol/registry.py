@@ -21,7 +21,9 @@ class Choice:
 
 
 TECHNIQUES = {
-    "delta": Choice("Woodcock tracking: exact free flights by rejection against the majorant", "tracking/delta.h"),
+    "delta": Choice(
+        "Woodcock tracking: exact free flights by rejection against the majorant", "tracking/delta.h"
+    ),
 }
 TRANSMITTANCES = {
     "ratio": Choice("ratio tracking: product of null-collision probabilities", "tracking/ratio.h"),

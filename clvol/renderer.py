@@ -181,8 +181,12 @@ class Session:
             4 * len(wavefront.fields),
             ", ".join(f.name for f in wavefront.fields),
         )
-        log.info("pool: %d slots in %d groups; %.1f MiB on the device", wavefront.pool.slots, wavefront.groups,
-                 wavefront.bytes / 2**20)
+        log.info(
+            "pool: %d slots in %d groups; %.1f MiB on the device",
+            wavefront.pool.slots,
+            wavefront.groups,
+            wavefront.bytes / 2**20,
+        )
 
     def choices(self) -> dict[str, str]:
         """The choices in force; "none" where the scene has no use for one."""
@@ -285,7 +289,9 @@ def kernel_config(prepared: PreparedScene, choices: dict[str, str], device: Devi
             "transmittance 'none' cannot render point and directional lights",
             hint="only next-event estimation reaches them: use ratio",
         )
-    tuning = {"local_size": 1, "group_slots": 256} if device.is_cpu else {"local_size": 128, "group_slots": 1024}
+    tuning = (
+        {"local_size": 1, "group_slots": 256} if device.is_cpu else {"local_size": 128, "group_slots": 1024}
+    )
     return KernelConfig(features, majorant=prepared.majorant, **resolved, **tuning)
 
 

@@ -104,14 +104,9 @@ def _volume_buffers(device: Device, prepared: PreparedScene) -> dict[str, cl.Buf
         )
     pool = cl.Buffer(device.context, cl.mem_flags.READ_ONLY, pool_bytes)
     for record, volume in zip(table, prepared.volumes.values(), strict=True):
-        channels = volume.bricks.channels
-
-        def sink(first: int, samples: np.ndarray, base: int = int(record["brick_offset"]), c: int = channels) -> None:
-            if samples.size:
-                at = (base + first * c) * BRICK_SAMPLES * 4
-                cl.enqueue_copy(device.queue, pool, samples, dst_offset=at, is_blocking=True)
-
-        volume.bricks.write(sink)
+        for first, samples in volume.bricks.stored():
+            at = (int(record["brick_offset"]) + first * volume.bricks.channels) * BRICK_SAMPLES * 4
+            cl.enqueue_copy(device.queue, pool, samples, dst_offset=at, is_blocking=True)
     return {"volumes": _buffer(device, table), "tops": _buffer(device, np.concatenate(tops)), "bricks": pool}
 
 

@@ -133,9 +133,12 @@ class Wavefront:
         per_round = max(1, _MAX_ROUND_JOBS // (self.pass_samples * self.pixels)) * self.pass_samples
         while done < count and not (done and should_stop()):
             part = min(count - done, per_round)
-            finished = self._run_round(first + done, part, should_stop, lambda n, base=done: report(
-                Progressed(base + n, time.perf_counter() - start)
-            ))
+            finished = self._run_round(
+                first + done,
+                part,
+                should_stop,
+                lambda n, base=done: report(Progressed(base + n, time.perf_counter() - start)),
+            )
             done += finished
             if finished < part:
                 break
@@ -163,9 +166,11 @@ class Wavefront:
             waves = int(np.clip(waves * _BATCH_SECONDS / max(elapsed, 1e-6), 1, max(2 * waves, 4)))
             control = self._read_control()
             begun = min(allowed, -(-int(control[_NEXT_JOB]) // pass_jobs))
-            arrived = control[_DONE:]
-            while finished < begun and arrived[finished % self.pool.ring_passes] == samples[finished] * self.pixels:
-                self._accumulate(finished % self.pool.ring_passes, samples[finished])
+            while finished < begun:
+                place = finished % self.pool.ring_passes
+                if control[_DONE + place] != samples[finished] * self.pixels:
+                    break
+                self._accumulate(place, samples[finished])
                 finished += 1
                 report(sum(samples[:finished]))
             if finished == passes or (finished == begun and begun and should_stop()):

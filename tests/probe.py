@@ -45,7 +45,10 @@ def unit_cube():
     return to_world
 
 
-def scene_of(medium, emitters=(ConstantEmitter(),), integrator=None, size=(8, 8), sensor=None, to_world=None):
+WHITE = (ConstantEmitter(),)
+
+
+def scene_of(medium, emitters=WHITE, integrator=None, size=(8, 8), sensor=None, to_world=None):
     """One medium in the unit cube before a camera that looks along +z."""
     if sensor is None:
         eye = np.eye(4)
@@ -79,8 +82,10 @@ class Probe:
         )
 
     def run(self, headers, body, outputs, inputs=()):
-        """Run `body` for `outputs[0].size` work-items with index `i`; arrays are out0, out1, …, in0, in1, …"""
-        names = [(f"out{n}", a) for n, a in enumerate(outputs)] + [(f"in{n}", a) for n, a in enumerate(inputs)]
+        """Run `body` for `outputs[0].size` work-items with index `i`; arrays are out0, …, in0, …"""
+        names = [(f"out{n}", a) for n, a in enumerate(outputs)] + [
+            (f"in{n}", a) for n, a in enumerate(inputs)
+        ]
         c_types = {"f": "float", "u": "uint", "i": "int"}
         extra = "".join(f", __global {c_types[a.dtype.kind]} *{name}" for name, a in names)
         source = programs.compose(

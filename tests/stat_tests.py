@@ -39,9 +39,12 @@ def chi2_p_value(observed, expected, least=10.0):
 
 def z_score(mean, variance_of_mean, reference, reference_variance=0.0):
     """Deviation in standard errors; 0/0 counts as agreement."""
-    difference = np.asarray(mean, float) - reference
-    error = np.sqrt(np.asarray(variance_of_mean, float) + reference_variance)
-    return np.divide(difference, error, out=np.where(difference == 0, 0.0, np.inf) + 0 * difference, where=error > 0)
+    difference = np.asarray(np.asarray(mean, float) - reference)
+    error = np.broadcast_to(
+        np.sqrt(np.asarray(variance_of_mean, float) + reference_variance), difference.shape
+    )
+    certain = np.where(difference == 0, 0.0, np.inf)
+    return np.divide(difference, error, out=certain, where=error > 0)
 
 
 def largest_z(comparisons, alpha=FALSE_ALARM):
@@ -58,12 +61,17 @@ def tile_means(image, variance, tile):
     return blocks.mean((1, 3)).reshape(-1, c), variances.mean((1, 3)).reshape(-1, c) / tile**2
 
 
+def image_mean(result):
+    """Mean over the pixels and its variance, per channel."""
+    count = result.image.shape[0] * result.image.shape[1]
+    return result.image.mean((0, 1), dtype=float), result.variance.sum((0, 1), dtype=float) / count**2
+
+
 def assert_same_picture(a, b, tile=8, alpha=FALSE_ALARM):
     """Image mean and every tile of two independent Results agree."""
-    (ma, va), (mb, vb) = (tile_means(r.image, r.variance, tile) for r in (a, b))
-    z = z_score(ma, va, mb, vb)
-    assert np.abs(z).max() < largest_z(z.size, alpha / 2), f"a tile deviates by {np.abs(z).max():.2f} sigma"
-    count = a.image.shape[0] * a.image.shape[1]
-    pairs = [(r.image.astype(float).mean((0, 1)), r.variance.astype(float).sum((0, 1)) / count**2) for r in (a, b)]
-    z = z_score(pairs[0][0], pairs[0][1], pairs[1][0], pairs[1][1])
-    assert np.abs(z).max() < largest_z(z.size, alpha / 2), f"the image mean deviates by {np.abs(z).max():.2f} sigma"
+    for what, (mean_a, variance_a), (mean_b, variance_b) in (
+        ("a tile", *(tile_means(r.image, r.variance, tile) for r in (a, b))),
+        ("the image mean", *(image_mean(r) for r in (a, b))),
+    ):
+        z = np.abs(z_score(mean_a, variance_a, mean_b, variance_b))
+        assert z.max() < largest_z(z.size, alpha / 2), f"{what} deviates by {z.max():.2f} sigma"

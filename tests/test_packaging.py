@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+import sysconfig
 import zipfile
 from pathlib import Path
 
@@ -13,9 +14,9 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 COMPOSE = """
 import site, sys
-site.addsitedir(sys.argv[1])  # as site-packages: its .pth files count
-sys.path.insert(0, sys.argv[1])
+site.addsitedir(sys.argv[1])  # as site-packages, so that .pth files count
 import clvol
+sys.path += sys.argv[2:]  # what clvol depends on, and perhaps another clvol
 from clvol.config import Features, KernelConfig
 from clvol.programs import stage_source
 config = KernelConfig(Features(media=1, volumes=1, heterogeneous=True, trilinear=True, scattering=True))
@@ -62,7 +63,8 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def compose(folder: Path, site: Path) -> Path:
     """In `folder`, compose kernels with the clvol that `site` makes importable; where that clvol is."""
-    command = [sys.executable, "-c", COMPOSE, str(site)]
+    dependencies = {sysconfig.get_path("purelib"), sysconfig.get_path("platlib")}
+    command = [sys.executable, "-S", "-c", COMPOSE, str(site), *dependencies]
     outcome = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     assert outcome.returncode == 0, outcome.stderr
     return Path(outcome.stdout.strip())

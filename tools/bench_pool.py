@@ -51,4 +51,8 @@ def show_pool(figures: Figures) -> None:
         "render",
         "M paths/s",
     ]
-    show(f"pool: seconds per stage, {first['paths']} paths, {first['bytes_per_slot']} bytes per slot", columns, rows)
+    show(
+        f"pool: seconds per stage, {first['paths']} paths, {first['bytes_per_slot']} bytes per slot",
+        columns,
+        rows,
+    )

@@ -102,13 +102,15 @@ def _visit(size: np.ndarray, extent: np.ndarray, visit_cost: float) -> float:
     return visit_cost * 0.5 * (a * b + b * c + c * a)
 
 
-def _leaf_cost(high: np.ndarray, size: np.ndarray, extent: np.ndarray, rate: float, visit_cost: float) -> np.ndarray:
+def _leaf_cost(
+    high: np.ndarray, size: np.ndarray, extent: np.ndarray, rate: float, visit_cost: float
+) -> np.ndarray:
     volume = float(np.prod(size * extent[::-1]))
     return volume * rate * high.astype(np.float64) + _visit(size, extent, visit_cost)
 
 
 def pack_maximum(high: np.ndarray) -> np.ndarray:
-    """First word of a leaf: the maximum's bits with the two low ones set, which rounds it up; 3 for an exact 0.
+    """First word of a leaf: the maximum's bits with the two low ones set (rounds it up); 3 for an exact 0.
 
     Infinity would become a NaN and is refused; bounds of finite volumes never hold it.
     """

@@ -7,7 +7,7 @@ Bricks that are constant are stored once per value.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,17 +43,20 @@ class BrickMap:
     origin: tuple[int, int, int]
     channels: int
 
-    def write(self, sink: Callable[[int, np.ndarray], None]) -> None:
-        """Hand every brick to `sink(first_brick, float32 (n, 9, 9, 9, channels))`, a bounded chunk at a time."""
+    def stored(self) -> Iterator[tuple[int, np.ndarray]]:
+        """Every brick to store, a bounded chunk at a time: (first brick, float32 (n, 9, 9, 9, channels))."""
         varying = self.brick_count - len(self.constants)
         for places, samples in _iterate(self.grid):
             numbers = self.top[tuple(places.T)]
             stored = numbers < varying
             if stored.any():
                 first = int(numbers[stored].min())  # numbered in the order of iteration: consecutive
-                sink(first, np.ascontiguousarray(samples[stored]))
-        shape = (len(self.constants), BRICK_EDGE, BRICK_EDGE, BRICK_EDGE, self.channels)
-        sink(varying, np.ascontiguousarray(np.broadcast_to(self.constants[:, None, None, None, :], shape)))
+                yield first, np.ascontiguousarray(samples[stored])
+        for number, values in enumerate(self.constants, varying):
+            yield (
+                number,
+                np.broadcast_to(values, (1, BRICK_EDGE, BRICK_EDGE, BRICK_EDGE, self.channels)).copy(),
+            )
 
 
 def build_bricks(grid: Grid) -> BrickMap:
@@ -128,7 +131,9 @@ def _iterate_dense(grid: DenseGrid) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         slab = slab[np.ix_(zs - zs[0], ys, xs)]
         windows = np.lib.stride_tricks.sliding_window_view(slab, (BRICK_EDGE, BRICK_EDGE), axis=(1, 2))
         windows = windows[:, ::BRICK_CELLS, ::BRICK_CELLS]  # (9, by, bx, channels, 9, 9)
-        samples = windows.transpose(1, 2, 0, 4, 5, 3).reshape(by * bx, BRICK_EDGE, BRICK_EDGE, BRICK_EDGE, channels)
+        samples = windows.transpose(1, 2, 0, 4, 5, 3).reshape(
+            by * bx, BRICK_EDGE, BRICK_EDGE, BRICK_EDGE, channels
+        )
         yield np.stack([np.full_like(y, z), y, x], axis=1), samples
 
 

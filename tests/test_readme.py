@@ -1,0 +1,49 @@
+"""What the README promises: its example runs, and its tables name every choice and every plugin."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from clvol.registry import FAMILIES
+from clvol.scene.loader import PLUGINS
+
+ROOT = Path(__file__).resolve().parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PLUGIN_NAMES = sorted({name for plugins in PLUGINS.values() for name in plugins} - {"scene"})
+
+
+def test_the_two_commands_stand_at_the_top_with_the_picture() -> None:
+    top = README[:900]
+    assert ".venv/bin/pip install . && .venv/bin/clvol render scenes/fire.xml -o fire.exr" in top
+    assert ".venv/bin/pip install '.[test]' && .venv/bin/pytest" in top
+    [picture] = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", top)
+    assert (ROOT / picture).is_file()
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_the_table_lists_every_choice(family: str) -> None:
+    [row] = re.findall(rf"^\| `--{family}` \| (.*) \|$", README, re.MULTILINE)
+    assert re.findall(r"`([\w-]+)`", row) == list(FAMILIES[family])
+
+
+@pytest.mark.parametrize("name", PLUGIN_NAMES)
+def test_the_table_lists_every_plugin(name: str) -> None:
+    table = README.split("## What is supported")[1].split("\n## ")[0]
+    assert f"`{name}`" in table
+
+
+def test_the_example_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    [example] = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    (tmp_path / "scenes").symlink_to(ROOT / "scenes", target_is_directory=True)
+    monkeypatch.chdir(tmp_path)
+    exec(example, {})
+    assert (tmp_path / "cloud.exr").stat().st_size > 10000
+
+
+@pytest.mark.parametrize("listed", ["clvol", "cl", "scenes", "tests", "tools", ".ci/run", "CONTRIBUTING.md"])
+def test_what_is_listed_is_there(listed: str) -> None:
+    assert listed in README
+    assert (ROOT / listed).exists()
