@@ -94,7 +94,7 @@ def open_device(pattern: str | None = None) -> Device:
     if not found:
         raise DeviceError(
             "no OpenCL device found",
-            hint="install one: `pip install pocl-binary-distribution` on Linux x86-64, or your vendor's driver",
+            hint="`pip install pocl-binary-distribution` (Linux x86-64), or install your vendor's driver",
         )
     pattern = pattern if pattern is not None else os.environ.get("CLVOL_DEVICE")
     if pattern:

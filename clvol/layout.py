@@ -247,9 +247,10 @@ def layout_text(config: KernelConfig) -> str:
         if field.kind == "i":
             get = f"(int){at}"
         c_type = _C_TYPES[field.kind]
-        parts.append(
-            f"/* {field.meaning} */\n"
-            f"INLINE {c_type} path_{field.name}(const Scene *scene, uint slot) {{ return {get}; }}\n"
-            f"INLINE void set_path_{field.name}(const Scene *scene, uint slot, {c_type} value) {{ {at} = {put}; }}"
-        )
+        slot = "const Scene *scene, uint slot"
+        parts += [
+            f"/* {field.meaning} */",
+            f"INLINE {c_type} path_{field.name}({slot}) {{ return {get}; }}",
+            f"INLINE void set_path_{field.name}({slot}, {c_type} value) {{ {at} = {put}; }}",
+        ]
     return "\n".join(parts) + "\n"

@@ -9,7 +9,7 @@ import numpy as np
 
 from clvol.accel import choice
 from clvol.accel.bounds import Bounds, with_slack
-from clvol.accel.kdtree import KdTree, build_kdtree
+from clvol.accel.kdtree import KdTree, build_kdtree, tree_lattice
 from clvol.config import Features, is_clipped, is_homogeneous, scene_media, shape_bounds
 from clvol.errors import SceneError
 from clvol.scene import records
@@ -106,22 +106,31 @@ def _choose_majorants(
     """Bounds and trees per medium for one kind of majorant, the cheapest on the whole for `auto`."""
     if not media:
         return "none", {}, {}
-    fine, grids, trees, costs = {}, {}, {}, {"global": 0.0, "grid": 0.0, "kdtree": 0.0}
-    for medium in media:
-        prepared = volumes[id(medium.sigma_t)]
-        bounds = with_slack(prepared.bricks.minimum, prepared.bricks.maximum, BOUND_CELLS)
-        to_world = np.linalg.inv(prepared.world_to_index)[:3, :3]
-        extent = np.linalg.norm(to_world, axis=0) * bounds.cell_size
-        fine[id(medium)] = bounds
-        costs["global"] += choice.global_cost(bounds, extent, medium.scale)
-        grids[id(medium)], cost = choice.best_grid(bounds, extent, medium.scale)
-        costs["grid"] += cost
-        if majorant in ("auto", "kdtree"):
-            trees[id(medium)] = build_kdtree(bounds, extent, medium.scale, choice.NODE_COST)
-            costs["kdtree"] += trees[id(medium)].cost
+    names = ("global", "grid", "kdtree") if majorant == "auto" else (majorant,)
+    found = {name: [_majorant(m, volumes[id(m.sigma_t)], name) for m in media] for name in names}
+    costs = {name: sum(cost for _, _, cost in found[name]) for name in names}
+    chosen = min(costs, key=costs.get)
     if majorant == "auto":
-        majorant = min(costs, key=costs.get)
-        least = costs[majorant] or 1.0
+        least = costs[chosen] or 1.0
         relative = ", ".join(f"{name} {cost / least:.2f}" for name, cost in costs.items())
-        log.info("majorant %s: expected cost per ray relative to it: %s", majorant, relative)
-    return majorant, (grids if majorant == "grid" else fine), trees
+        log.info("majorant %s: expected cost per ray relative to it: %s", chosen, relative)
+    bounds = {id(m): b for m, (b, _, _) in zip(media, found[chosen], strict=True)}
+    trees = {id(m): tree for m, (_, tree, _) in zip(media, found[chosen], strict=True) if tree}
+    return chosen, bounds, trees
+
+
+def _majorant(
+    medium: records.Medium, volume: PreparedVolume, kind: str
+) -> tuple[Bounds, KdTree | None, float]:
+    """One medium's majorant of one kind: the lattice it is walked on, its tree, its expected cost."""
+    bounds = with_slack(volume.bricks.minimum, volume.bricks.maximum, BOUND_CELLS)
+    extent = np.linalg.norm(np.linalg.inv(volume.world_to_index)[:3, :3], axis=0)
+    if kind == "kdtree":
+        bounds = tree_lattice(bounds)
+        cell = extent * bounds.cell_size
+        tree = build_kdtree(bounds, cell, medium.scale, choice.LEAF_COST, choice.STEP_COST)
+        return bounds, tree, tree.cost
+    if kind == "grid":
+        bounds, cost = choice.best_grid(bounds, extent * bounds.cell_size, medium.scale)
+        return bounds, None, cost
+    return bounds, None, choice.global_cost(bounds, extent * bounds.cell_size, medium.scale)

@@ -19,8 +19,9 @@ from clvol.device import Device
 from clvol.errors import DeviceError
 
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"')
-BUILD_OPTIONS = ("-cl-std=CL1.2",)
-"""No relaxed-math flag: they may delete the checks for NaN and infinity (METHODS §7)."""
+BUILD_OPTIONS = ("-cl-std=CL1.2", "-w")
+"""No relaxed-math flag: they may delete the checks for NaN and infinity (METHODS §7).  -w: compilers
+warn wherever a feature's macro makes a condition constant, which is how the kernels are composed."""
 
 
 @cache
