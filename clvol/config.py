@@ -65,6 +65,7 @@ class Features:
         kinds = {type(e) for e in emitters}
         grey_light = all(_emitter_is_grey(e) for e in emitters)
         shapes = [s for s in scene.shapes if s.interior is not None]
+        bounds = {bounding_kind(s) for s in shapes}
         return cls(
             media=len(media),
             volumes=len(volumes),
@@ -78,8 +79,8 @@ class Features:
             albedo_volumes=any(isinstance(m.albedo, records.GridVolume) for m in media),
             trilinear=any(v.filter_type == "trilinear" for v in volumes),
             nearest=any(v.filter_type == "nearest" for v in volumes),
-            cubes=any(s.kind == "cube" for s in shapes),
-            spheres=any(s.kind == "sphere" for s in shapes),
+            cubes="cube" in bounds,
+            spheres="sphere" in bounds,
             isotropic=any(m.phase.kind == "isotropic" for m in media),
             hg=any(m.phase.kind == "hg" for m in media),
             scattering=any(_scatters(m) for m in media),
@@ -209,6 +210,23 @@ def is_clipped(medium: records.Medium) -> bool:
     if medium.homogeneous:
         return False
     return not isinstance(medium.sigma_t, records.GridVolume) or medium.sigma_t.clipped
+
+
+def bounding_kind(shape: records.Shape) -> str:
+    """What bounds the shape's medium: "cube", "sphere", or "none" where the volume's box, which clips the
+    medium anyway, lies within the shape."""
+    medium = shape.interior
+    if not is_clipped(medium):
+        return shape.kind
+    volume = medium.sigma_t
+    if isinstance(volume, records.GridVolume):
+        lower, upper, box_to_world = volume.lower, volume.upper, volume.index_to_world
+    else:
+        lower, upper, box_to_world = np.zeros(3), np.ones(3), volume.to_world
+    corners = np.array([(*np.where(bits, upper, lower), 1.0) for bits in np.ndindex(2, 2, 2)]).T
+    local = (np.linalg.inv(shape.to_world) @ box_to_world @ corners)[:3]
+    reach = np.linalg.norm(local, axis=0) if shape.kind == "sphere" else np.abs(local)
+    return "none" if reach.max() <= 1 + 1e-6 else shape.kind
 
 
 def _scatters(medium: records.Medium) -> bool:

@@ -35,7 +35,7 @@ VOLUME = _record(
 
 MEDIUM = _record(
     ("shape_from_world", "f", 12),
-    ("shape_kind", "i", 1),  # SHAPE_CUBE, SHAPE_SPHERE
+    ("shape_kind", "i", 1),  # SHAPE_NONE (the box alone bounds it), SHAPE_CUBE, SHAPE_SPHERE
     ("homogeneous", "i", 1),
     ("clipped", "i", 1),  # 1: also bounded by box_lower..box_upper under box_from_world
     ("box_from_world", "f", 12),
@@ -103,7 +103,7 @@ RECORDS = {
 }
 
 ENUMS = {
-    "SHAPE": ("CUBE", "SPHERE"),
+    "SHAPE": ("NONE", "CUBE", "SPHERE"),
     "PHASE": ("ISOTROPIC", "HG"),
     "EMITTER": ("CONSTANT", "ENVMAP", "DIRECTIONAL", "POINT"),
     "QUEUE": ("GENERATE", "INTERSECT", "MEDIUM", "SHADE", "SHADOW"),

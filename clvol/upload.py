@@ -13,7 +13,7 @@ import pyopencl as cl
 
 from clvol import layout
 from clvol.accel.kdtree import pack_maximum
-from clvol.config import KernelConfig, is_clipped, is_homogeneous, scene_media
+from clvol.config import KernelConfig, bounding_kind, is_clipped, is_homogeneous, scene_media
 from clvol.device import Device
 from clvol.environment import envmap_distribution, luminance
 from clvol.errors import DeviceError
@@ -118,7 +118,7 @@ def _media(prepared: PreparedScene, volumes: dict[int, int]) -> np.ndarray:
     for record, shape in zip(table, shapes, strict=True):
         medium = shape.interior
         record["shape_from_world"] = rows_3x4(_from_centred(shape.to_world, prepared.centre))
-        record["shape_kind"] = layout.enum("SHAPE", shape.kind)
+        record["shape_kind"] = layout.enum("SHAPE", bounding_kind(shape))
         record["homogeneous"] = int(is_homogeneous(medium))
         record["clipped"] = int(is_clipped(medium))
         record["phase_kind"] = layout.enum("PHASE", medium.phase.kind)

@@ -43,11 +43,10 @@ INLINE void clip_sphere(Ray ray, float *t0, float *t1)
 /* The part of the ray inside `medium`, cut to [t0, t1]; empty when the result has t0 >= t1. */
 INLINE void medium_interval(__global const Medium *medium, Ray ray, float *t0, float *t1)
 {
-    const Ray shape_ray = transform_ray(medium->shape_from_world, ray);
-    if (CLVOL_HAS_CUBE && (!CLVOL_HAS_SPHERE || medium->shape_kind == SHAPE_CUBE))
-        clip_box(shape_ray, (float3)(-1.0f), (float3)(1.0f), t0, t1);
-    else
-        clip_sphere(shape_ray, t0, t1);
+    if (CLVOL_HAS_CUBE && medium->shape_kind == SHAPE_CUBE)
+        clip_box(transform_ray(medium->shape_from_world, ray), (float3)(-1.0f), (float3)(1.0f), t0, t1);
+    if (CLVOL_HAS_SPHERE && medium->shape_kind == SHAPE_SPHERE)
+        clip_sphere(transform_ray(medium->shape_from_world, ray), t0, t1);
     if (CLVOL_HAS_CLIPPED && medium->clipped) {
         const float3 lower = (float3)(medium->box_lower[0], medium->box_lower[1], medium->box_lower[2]);
         const float3 upper = (float3)(medium->box_upper[0], medium->box_upper[1], medium->box_upper[2]);

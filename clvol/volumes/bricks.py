@@ -46,12 +46,11 @@ class BrickMap:
     def stored(self) -> Iterator[tuple[int, np.ndarray]]:
         """Every brick to store, a bounded chunk at a time: (first brick, float32 (n, 9, 9, 9, channels))."""
         varying = self.brick_count - len(self.constants)
-        for places, samples in _iterate(self.grid):
-            numbers = self.top[tuple(places.T)]
-            stored = numbers < varying
-            if stored.any():
-                first = int(numbers[stored].min())  # numbered in the order of iteration: consecutive
-                yield first, np.ascontiguousarray(samples[stored])
+        gather = _gather_dense if isinstance(self.grid, DenseGrid) else _gather_sparse
+        first = 0  # varying bricks are numbered in the order of their places
+        for samples in gather(self.grid, self.top < varying):
+            yield first, samples
+            first += len(samples)
         for number, values in enumerate(self.constants, varying):
             yield (
                 number,
@@ -61,44 +60,41 @@ class BrickMap:
 
 def build_bricks(grid: Grid) -> BrickMap:
     """Find which bricks of `grid` vary, number them, and bound them.  Reads the grid once."""
-    size, origin, places_per_axis = _lattice(grid)
-    bx, by, bz = places_per_axis
-    channels = grid.values.shape[3] if isinstance(grid, DenseGrid) else 1
-    fill = np.float32(grid.background if isinstance(grid, SparseGrid) else 0)
-    top = np.full((bz, by, bx), -1, np.int32)
-    constant = np.full((bz, by, bx, channels), fill, np.float32)
-    if isinstance(grid, SparseGrid):
-        constant[..., 0] = _Leaves(grid).value[:-1, :-1, :-1]
-    half = np.repeat(np.repeat(np.repeat(constant, 2, 0), 2, 1), 2, 2)
-    minimum, maximum = half.min(axis=3), half.max(axis=3)
-    del half
-    count = 0
-    for places, samples in _iterate(grid):
-        low, high = samples.min(axis=(1, 2, 3)), samples.max(axis=(1, 2, 3))
-        varies = (low != high).any(axis=1)
-        numbers = np.full(len(places), -1, np.int32)
-        numbers[varies] = count + np.arange(np.count_nonzero(varies))
-        count += int(np.count_nonzero(varies))
-        z, y, x = places.T
-        top[z, y, x] = numbers
-        constant[z, y, x] = low
-        _bound_halves(samples, places, minimum, maximum)
-    unique, inverse = np.unique(constant[top < 0], axis=0, return_inverse=True)
-    top[top < 0] = count + inverse.reshape(-1)
-    return BrickMap(grid, top, count + len(unique), unique, minimum, maximum, size, origin, channels)
+    size, origin, _ = _lattice(grid)
+    low, high = _extrema_dense(grid) if isinstance(grid, DenseGrid) else _extrema_sparse(grid)
+    brick_low, brick_high = _merge_halves(low, np.minimum), _merge_halves(high, np.maximum)
+    varies = (brick_low != brick_high).any(axis=3)
+    count = int(np.count_nonzero(varies))
+    constants, inverse = np.unique(brick_low[~varies], axis=0, return_inverse=True)
+    top = np.empty(varies.shape, np.int32)
+    top[varies] = np.arange(count)
+    top[~varies] = count + inverse.reshape(-1)
+    minimum, maximum = low.min(axis=3), high.max(axis=3)
+    return BrickMap(
+        grid, top, count + len(constants), constants, minimum, maximum, size, origin, low.shape[3]
+    )
 
 
-def _bound_halves(samples: np.ndarray, places: np.ndarray, minimum: np.ndarray, maximum: np.ndarray) -> None:
-    """Extrema of the eight 4³-cell cubes of each brick, written at their places in the fine lattice."""
-    z, y, x = 2 * places.T
-    low, high = samples.min(axis=4), samples.max(axis=4)
-    parts = (slice(0, 5), slice(4, 9))
-    for dz in (0, 1):
-        for dy in (0, 1):
-            for dx in (0, 1):
-                cut = (slice(None), parts[dz], parts[dy], parts[dx])
-                minimum[z + dz, y + dy, x + dx] = low[cut].min(axis=(1, 2, 3))
-                maximum[z + dz, y + dy, x + dx] = high[cut].max(axis=(1, 2, 3))
+def _merge_halves(values: np.ndarray, combine: np.ufunc) -> np.ndarray:
+    """Extrema of bricks from those of their halves: (2n, 2m, 2k, channels) to (n, m, k, channels)."""
+    for axis in range(3):
+        values = combine(
+            np.take(values, range(0, values.shape[axis], 2), axis),
+            np.take(values, range(1, values.shape[axis], 2), axis),
+        )
+    return values
+
+
+def _half_extrema(samples: np.ndarray, axis: int, combine: np.ufunc) -> np.ndarray:
+    """Extrema over stretches of BOUND_CELLS cells, both end samples included, along one axis."""
+    count = (samples.shape[axis] - 1) // BOUND_CELLS
+    shape = samples.shape
+    inner = [slice(None)] * samples.ndim
+    inner[axis] = slice(0, count * BOUND_CELLS)
+    blocks = samples[tuple(inner)].reshape(*shape[:axis], count, BOUND_CELLS, *shape[axis + 1 :])
+    ends = [slice(None)] * samples.ndim
+    ends[axis] = slice(BOUND_CELLS, None, BOUND_CELLS)
+    return combine(combine.reduce(blocks, axis=axis + 1), samples[tuple(ends)])
 
 
 def _lattice(grid: Grid) -> tuple[tuple[int, int, int], tuple[int, int, int], tuple[int, int, int]]:
@@ -114,27 +110,36 @@ def _lattice(grid: Grid) -> tuple[tuple[int, int, int], tuple[int, int, int], tu
     return size, origin, bricks
 
 
-def _iterate(grid: Grid) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Chunks of bricks that may vary: places int (n, 3) as z, y, x, and samples (n, 9, 9, 9, channels)."""
-    return _iterate_dense(grid) if isinstance(grid, DenseGrid) else _iterate_sparse(grid)
-
-
-def _iterate_dense(grid: DenseGrid) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def _slabs(grid: DenseGrid) -> Iterator[np.ndarray]:
+    """The samples of each layer of bricks, float32 (9, 8by + 1, 8bx + 1, channels), borders repeated."""
     _, _, (bx, by, bz) = _lattice(grid)
-    nz, ny, nx, channels = grid.values.shape
+    nz, ny, nx, _ = grid.values.shape
     ys = np.minimum(np.arange(by * BRICK_CELLS + 1), ny - 1)
     xs = np.minimum(np.arange(bx * BRICK_CELLS + 1), nx - 1)
-    y, x = (a.reshape(-1) for a in np.meshgrid(np.arange(by), np.arange(bx), indexing="ij"))
-    for z in range(bz):
-        zs = np.minimum(np.arange(z * BRICK_CELLS, z * BRICK_CELLS + BRICK_EDGE), nz - 1)
-        slab = np.ascontiguousarray(grid.values[zs[0] : zs[-1] + 1])
-        slab = slab[np.ix_(zs - zs[0], ys, xs)]
-        windows = np.lib.stride_tricks.sliding_window_view(slab, (BRICK_EDGE, BRICK_EDGE), axis=(1, 2))
-        windows = windows[:, ::BRICK_CELLS, ::BRICK_CELLS]  # (9, by, bx, channels, 9, 9)
-        samples = windows.transpose(1, 2, 0, 4, 5, 3).reshape(
-            by * bx, BRICK_EDGE, BRICK_EDGE, BRICK_EDGE, channels
-        )
-        yield np.stack([np.full_like(y, z), y, x], axis=1), samples
+    for z in range(0, bz * BRICK_CELLS, BRICK_CELLS):
+        zs = np.minimum(np.arange(z, z + BRICK_EDGE), nz - 1)
+        yield np.ascontiguousarray(grid.values[zs[0] : zs[-1] + 1])[np.ix_(zs - zs[0], ys, xs)]
+
+
+def _extrema_dense(grid: DenseGrid) -> tuple[np.ndarray, np.ndarray]:
+    """Extrema of every half brick: two arrays (2bz, 2by, 2bx, channels)."""
+    lows, highs = [], []
+    for slab in _slabs(grid):
+        low = high = slab
+        for axis in range(3):
+            low, high = _half_extrema(low, axis, np.minimum), _half_extrema(high, axis, np.maximum)
+        lows.append(low)
+        highs.append(high)
+    return np.concatenate(lows), np.concatenate(highs)
+
+
+def _gather_dense(grid: DenseGrid, wanted: np.ndarray) -> Iterator[np.ndarray]:
+    """Samples of the wanted bricks, layer by layer: (n, 9, 9, 9, channels)."""
+    for slab, layer in zip(_slabs(grid), wanted, strict=True):
+        if layer.any():
+            windows = np.lib.stride_tricks.sliding_window_view(slab, (BRICK_EDGE, BRICK_EDGE), axis=(1, 2))
+            windows = windows[:, ::BRICK_CELLS, ::BRICK_CELLS].transpose(1, 2, 0, 4, 5, 3)
+            yield np.ascontiguousarray(windows[layer])
 
 
 class _Leaves:
@@ -155,19 +160,39 @@ class _Leaves:
         self.leaf[z, y, x] = np.nonzero(inside)[0]
 
 
-def _iterate_sparse(grid: SparseGrid) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def _extrema_sparse(grid: SparseGrid) -> tuple[np.ndarray, np.ndarray]:
+    """Extrema of every half brick: two arrays (2bz, 2by, 2bx, 1)."""
     leaves = _Leaves(grid)
     bz, by, bx = (n - 1 for n in leaves.leaf.shape)
-    corners = [(dz, dy, dx) for dz in (0, 1) for dy in (0, 1) for dx in (0, 1)]
-    shifted = [(slice(dz, dz + bz), slice(dy, dy + by), slice(dx, dx + bx)) for dz, dy, dx in corners]
+    constant = leaves.value[:-1, :-1, :-1, None]
+    low = np.repeat(np.repeat(np.repeat(constant, 2, 0), 2, 1), 2, 2)
+    high = low.copy()
     varies = np.zeros((bz, by, bx), bool)
-    for cut in shifted:
-        varies |= (leaves.leaf[cut] >= 0) | (leaves.value[cut] != leaves.value[:-1, :-1, :-1])
+    for dz, dy, dx in np.ndindex(2, 2, 2):
+        cut = (slice(dz, dz + bz), slice(dy, dy + by), slice(dx, dx + bx))
+        varies |= (leaves.leaf[cut] >= 0) | (leaves.value[cut] != constant[..., 0])
     places = np.argwhere(varies)
+    for first, samples in zip(
+        range(0, len(places), _CHUNK_BRICKS), _gather_sparse(grid, varies), strict=True
+    ):
+        z, y, x = 2 * places[first : first + _CHUNK_BRICKS].T
+        for combine, target in ((np.minimum, low), (np.maximum, high)):
+            halves = samples
+            for axis in (1, 2, 3):
+                halves = _half_extrema(halves, axis, combine)
+            for dz, dy, dx in np.ndindex(2, 2, 2):
+                target[z + dz, y + dy, x + dx] = halves[:, dz, dy, dx]
+    return low, high
+
+
+def _gather_sparse(grid: SparseGrid, wanted: np.ndarray) -> Iterator[np.ndarray]:
+    """Samples of the wanted bricks, a chunk at a time: (n, 9, 9, 9, 1), far faces from the neighbours."""
+    leaves = _Leaves(grid)
+    places = np.argwhere(wanted)
     for first in range(0, len(places), _CHUNK_BRICKS):
         chunk = places[first : first + _CHUNK_BRICKS]
         samples = np.empty((len(chunk), BRICK_EDGE, BRICK_EDGE, BRICK_EDGE, 1), np.float32)
-        for corner in corners:
+        for corner in np.ndindex(2, 2, 2):
             source = tuple(slice(0, 1) if d else slice(0, 8) for d in corner)
             target = tuple(slice(8, 9) if d else slice(0, 8) for d in corner)
             z, y, x = (chunk + np.array(corner)).T
@@ -177,4 +202,4 @@ def _iterate_sparse(grid: SparseGrid) -> Iterator[tuple[np.ndarray, np.ndarray]]
             filled = leaf >= 0
             block[filled] = grid.leaf_values[leaf[filled]][(slice(None), *source)]
             samples[(slice(None), *target, 0)] = block
-        yield chunk, samples
+        yield samples
