@@ -107,7 +107,7 @@ ENUMS = {
     "PHASE": ("ISOTROPIC", "HG"),
     "EMITTER": ("CONSTANT", "ENVMAP", "DIRECTIONAL", "POINT"),
     "QUEUE": ("GENERATE", "INTERSECT", "MEDIUM", "SHADE", "SHADOW"),
-    "EVENT": ("IDLE", "ESCAPE", "COLLISION"),
+    "EVENT": ("ESCAPE", "COLLISION"),
     "ABSORPTION": tuple(registry.ABSORPTIONS),
     "CONTROL": ("NEXT_JOB", "JOB_LIMIT", "NON_FINITE", "DONE"),  # DONE: one counter per pass in the ring
 }

@@ -183,12 +183,8 @@ class Wavefront:
         self._write("render", self.render)
         self._write("control", np.zeros(_DONE + self.pool.ring_passes, np.uint32))
         counts = np.zeros((self.groups, layout.COUNTER_STRIDE), np.uint32)
-        counts[:, layout.enum("QUEUE", "GENERATE")] = self.config.group_slots
+        counts[:, len(layout.ENUMS["QUEUE"])] = self.config.group_slots  # all slots idle
         self._write("counts", counts)
-        queues = np.zeros((self.groups, len(layout.ENUMS["QUEUE"]), self.config.group_slots), np.uint32)
-        slots = np.arange(self.pool.slots, dtype=np.uint32).reshape(self.groups, -1)
-        queues[:, layout.enum("QUEUE", "GENERATE")] = slots
-        self._write("queues", queues)
 
     def _launch(self, waves: int) -> float:
         """Run `waves` waves; return the seconds they took on the device, and book them by stage."""

@@ -1,5 +1,5 @@
 /* From: GENERATE
-   To: INTERSECT (a new path), SHADE (idle: no job left)
+   To: INTERSECT (a new path); a slot for which there is no job stays idle
    Reads: the finished path, the job counter.
    Writes: results, every field of a new path. */
 #include "stages/generate.h"
@@ -8,6 +8,8 @@ __kernel __attribute__((reqd_work_group_size(CLVOL_LOCAL_SIZE, 1, 1))) void gene
 {
     const Scene scene = CLVOL_SCENE;
     const uint group = get_group_id(0);
+    wake_idle(&scene, group);
+    barrier(CLK_GLOBAL_MEM_FENCE); /* slots that fall idle below are not to be looked at above */
     const uint count = *queue_counter(&scene, group, QUEUE_GENERATE);
     __global const uint *slots = queue_entries(&scene, group, QUEUE_GENERATE);
     for (uint i = get_local_id(0); i < count; i += CLVOL_LOCAL_SIZE)

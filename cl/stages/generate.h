@@ -94,21 +94,41 @@ INLINE void start_job(const Scene *scene, uint slot, uint job)
 #endif
 }
 
+/* Takes the next job for `slot` if there is one.  The counter is looked at before it is touched, so that
+   idle slots do not fight over it at the end of a render. */
+INLINE bool take_job(const Scene *scene, uint group, uint slot)
+{
+    const uint limit = scene->control[CONTROL_JOB_LIMIT];
+    if (scene->control[CONTROL_NEXT_JOB] >= limit)
+        return false;
+    const uint job = atomic_inc(scene->control + CONTROL_NEXT_JOB);
+    if (job >= limit) {
+        atomic_dec(scene->control + CONTROL_NEXT_JOB);
+        return false;
+    }
+    start_job(scene, slot, job);
+    queue_push(scene, group, QUEUE_INTERSECT, slot);
+    return true;
+}
+
+/* A finished path: writes its result and starts the next one, or leaves the slot idle. */
 INLINE void generate(const Scene *scene, uint group, uint slot)
 {
-    const uint finished = path_job(scene, slot);
-    if (finished != NO_JOB) {
-        write_result(scene, slot, finished);
-        set_path_job(scene, slot, NO_JOB);
-    }
-    const uint job = atomic_inc(scene->control + CONTROL_NEXT_JOB);
-    if (job < scene->control[CONTROL_JOB_LIMIT]) {
-        start_job(scene, slot, job);
-        queue_push(scene, group, QUEUE_INTERSECT, slot);
-    } else {
-        atomic_dec(scene->control + CONTROL_NEXT_JOB);
-        set_path_event(scene, slot, EVENT_IDLE); /* comes back through shade: maybe the limit has risen then */
-        queue_push(scene, group, QUEUE_SHADE, slot);
+    write_result(scene, slot, path_job(scene, slot));
+    set_path_job(scene, slot, NO_JOB);
+    if (!take_job(scene, group, slot))
+        atomic_inc(idle_counter(scene, group));
+}
+
+/* Slots left idle earlier, now that the limit may have risen. */
+INLINE void wake_idle(const Scene *scene, uint group)
+{
+    if (*idle_counter(scene, group) == 0 || scene->control[CONTROL_NEXT_JOB] >= scene->control[CONTROL_JOB_LIMIT])
+        return;
+    for (uint i = get_local_id(0); i < CLVOL_GROUP_SLOTS; i += CLVOL_LOCAL_SIZE) {
+        const uint slot = group * CLVOL_GROUP_SLOTS + i;
+        if (path_job(scene, slot) == NO_JOB && take_job(scene, group, slot))
+            atomic_dec(idle_counter(scene, group));
     }
 }
 

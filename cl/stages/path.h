@@ -20,6 +20,12 @@ INLINE __global uint *queue_entries(const Scene *scene, uint group, uint queue)
     return scene->queues + (group * QUEUE_COUNT + queue) * CLVOL_GROUP_SLOTS;
 }
 
+/* Slots of the group that hold no path. */
+INLINE __global uint *idle_counter(const Scene *scene, uint group)
+{
+    return scene->counts + group * COUNTER_STRIDE + QUEUE_COUNT;
+}
+
 INLINE void queue_push(const Scene *scene, uint group, uint queue, uint slot)
 {
     const uint place = atomic_inc(queue_counter(scene, group, queue));
