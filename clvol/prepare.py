@@ -10,8 +10,8 @@ import numpy as np
 from clvol.accel import choice
 from clvol.accel.bounds import Bounds, with_slack
 from clvol.accel.kdtree import KdTree, build_kdtree, tree_lattice
-from clvol.config import Features, is_clipped, is_homogeneous, scene_media, shape_bounds
 from clvol.errors import SceneError
+from clvol.features import Features, is_clipped, is_homogeneous, scene_media, shape_bounds
 from clvol.scene import records
 from clvol.volumes.bricks import BOUND_CELLS, BrickMap, build_bricks
 from clvol.volumes.grid import DenseGrid

@@ -13,10 +13,11 @@ import pyopencl as cl
 
 from clvol import layout
 from clvol.accel.kdtree import pack_maximum
-from clvol.config import KernelConfig, bounding_kind, is_clipped, is_homogeneous, scene_media
+from clvol.config import KernelConfig
 from clvol.device import Device
 from clvol.environment import envmap_distribution, luminance
 from clvol.errors import DeviceError
+from clvol.features import bounding_kind, is_clipped, is_homogeneous, scene_media
 from clvol.film import filter_cdf
 from clvol.prepare import PreparedScene
 from clvol.scene import records

@@ -6,7 +6,6 @@ import pyopencl as cl
 from clvol import layout, programs, registry
 from clvol.config import KernelConfig
 from clvol.prepare import prepare
-from clvol.renderer import kernel_config, render_record
 from clvol.scene.records import (
     ConstantEmitter,
     ConstVolume,
@@ -19,6 +18,7 @@ from clvol.scene.records import (
     Scene,
     Shape,
 )
+from clvol.session import kernel_config, render_record
 from clvol.upload import upload_scene
 from clvol.volumes.grid import DenseGrid
 

@@ -17,7 +17,8 @@ import site, sys
 site.addsitedir(sys.argv[1])  # as site-packages, so that .pth files count
 import clvol
 sys.path += sys.argv[2:]  # what clvol depends on, and perhaps another clvol
-from clvol.config import Features, KernelConfig
+from clvol.config import KernelConfig
+from clvol.features import Features
 from clvol.programs import stage_source
 config = KernelConfig(Features(media=1, volumes=1, heterogeneous=True, trilinear=True, scattering=True))
 for stage in config.stages:

@@ -12,8 +12,8 @@ from clvol.config import KernelConfig
 from clvol.device import Device, open_device
 from clvol.prepare import PreparedScene, prepare
 from clvol.registry import FAMILIES, check_choice
-from clvol.renderer import Session, kernel_config
 from clvol.scene import load_file
+from clvol.session import Session, kernel_config
 
 
 @dataclass(frozen=True, eq=False)
