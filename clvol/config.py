@@ -82,6 +82,7 @@ class KernelConfig:
             "CLVOL_HAS_SPHERE": int(f.spheres),
             "CLVOL_HAS_TRILINEAR": int(f.trilinear),
             "CLVOL_HAS_NEAREST": int(f.nearest),
+            "CLVOL_HAS_COLOURED_VOLUME": int(f.coloured_volumes),
             "CLVOL_HAS_ALBEDO_VOLUME": int(f.albedo_volumes),
             "CLVOL_HAS_ISOTROPIC": int(f.isotropic),
             "CLVOL_HAS_HG": int(f.hg),

@@ -37,6 +37,7 @@ class Features:
     albedo_volumes: bool = False
     trilinear: bool = False
     nearest: bool = False
+    coloured_volumes: bool = False
     cubes: bool = False
     spheres: bool = False
     isotropic: bool = False
@@ -76,6 +77,7 @@ class Features:
             albedo_volumes=any(isinstance(m.albedo, records.GridVolume) for m in media),
             trilinear=any(v.filter_type == "trilinear" for v in volumes),
             nearest=any(v.filter_type == "nearest" for v in volumes),
+            coloured_volumes=any(channels_of(v) > 1 for v in volumes),
             cubes="cube" in bounds,
             spheres="sphere" in bounds,
             isotropic=any(m.phase.kind == "isotropic" for m in media),

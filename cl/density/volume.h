@@ -20,7 +20,8 @@ INLINE __global const float *volume_brick(const Scene *scene, __global const Vol
 /* Value of one channel of `volume` at index position p. */
 INLINE float volume_value(const Scene *scene, __global const Volume *volume, float3 p, int channel)
 {
-    const int stride = volume->channels;
+    const int stride = CLVOL_HAS_COLOURED_VOLUME ? volume->channels : 1;
+    channel = stride > 1 ? channel : 0; /* a grey volume serves every channel */
     const float x = clamp_to(p.x, 0.0f, (float)(volume->size[0] - 1));
     const float y = clamp_to(p.y, 0.0f, (float)(volume->size[1] - 1));
     const float z = clamp_to(p.z, 0.0f, (float)(volume->size[2] - 1));

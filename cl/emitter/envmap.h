@@ -24,9 +24,10 @@ INLINE float3 envmap_radiance(const Scene *scene, float3 direction)
     const int x1 = x0 + 1 < width ? x0 + 1 : 0;
     const float fx = p.x - (float)x0, fy = p.y - (float)y0;
     __global const float *t = scene->env_texels;
-    const float3 a = lerp(vload3((size_t)y0 * width + x0, t), vload3((size_t)y0 * width + x1, t), fx);
-    const float3 b = lerp(vload3((size_t)(y0 + 1) * width + x0, t), vload3((size_t)(y0 + 1) * width + x1, t), fx);
-    return lerp(a, b, fy);
+    const float3 a0 = vload3((size_t)y0 * width + x0, t), a1 = vload3((size_t)y0 * width + x1, t);
+    const float3 b0 = vload3((size_t)(y0 + 1) * width + x0, t), b1 = vload3((size_t)(y0 + 1) * width + x1, t);
+    const float3 a = (a1 - a0) * fx + a0, b = (b1 - b0) * fx + b0;
+    return (b - a) * fy + a;
 }
 
 /* First index i in [0, n) with cdf[i + 1] > u; cdf has n + 1 entries from 0 to 1. */
