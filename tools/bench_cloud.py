@@ -96,7 +96,7 @@ def show_cloud(figures: Figures) -> None:
         ("CPU microseconds per path", *(ranged(s["microseconds_per_path"]) for s in sides)),
         ("variance per sample, between rounds", *(f"{s['variance']:.5f}" for s in sides)),
         ("  as the program itself estimates it", f"{sides[0]['variance_by_pixel']:.5f}", "-"),
-        ("efficiency, 1/1000", *(ranged(s["efficiency"], 4) for s in sides)),
+        ("efficiency, 1 / (variance x CPU s)", *(ranged(s["efficiency"], 4) for s in sides)),
         ("mean of the image", *(f"{s['mean']:.6f} ± {s['standard_error']:.6f}" for s in sides)),
         ("CPU seconds to load and prepare, once", *(f"{s['setup_cpu']:.2f}" for s in sides)),
     ]
