@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
+from functools import cache, cached_property
 
 import pyopencl as cl
 
@@ -39,6 +39,8 @@ class Device:
     info: DeviceInfo
     context: cl.Context
     queue: cl.CommandQueue
+    programs: dict[str, cl.Program] = field(default_factory=dict)
+    """Built programs by source: a second render with the same features and choices builds nothing."""
 
     @cached_property
     def is_cpu(self) -> bool:
@@ -104,7 +106,13 @@ def open_device(pattern: str | None = None) -> Device:
             raise DeviceError(f"no OpenCL device matches {pattern!r}", hint=f"there are: {names}")
     else:
         chosen = [pair for pair in found if pair[0].kind == "GPU"] or found
-    info, device = chosen[0]
+    return _open(chosen[0][0].index)
+
+
+@cache
+def _open(index: int) -> Device:
+    """One context and queue per device and process."""
+    info, device = _found()[index]
     if "Portable Computing Language" in info.platform and shutil.which("ld") is None:
         raise DeviceError("PoCL needs the linker `ld` to build kernels", hint="install binutils")
     context = cl.Context([device])

@@ -95,10 +95,16 @@ def stage_source(config: KernelConfig, stage: str) -> str:
 
 
 def build(device: Device, source: str, name: str) -> cl.Program:
-    """Build a unit; a failing build raises DeviceError with the log, which names file and line."""
+    """Build a unit, once per device and process.
+
+    A build that fails raises DeviceError with the log, which names file and line.
+    """
+    if source in device.programs:
+        return device.programs[source]
     program = cl.Program(device.context, source)
     try:
-        return program.build(options=list(BUILD_OPTIONS))
+        device.programs[source] = program.build(options=list(BUILD_OPTIONS))
+        return device.programs[source]
     except cl.RuntimeError as error:
         log = program.get_build_info(device.queue.device, cl.program_build_info.LOG).strip() or str(error)
         raise DeviceError(f"kernel {name!r} does not build on {device.description}:\n{log}") from error

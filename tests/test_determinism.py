@@ -1,0 +1,169 @@
+"""The same scene, seed and choices give the same bits, however the work is scheduled, split or cut short.
+
+Nothing here is statistical but the last test, whose false-alarm rate is 1e-4.
+"""
+
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pictures import ball, box, gridded, hg, homogeneous, picture, render, volume
+from stat_tests import assert_same_picture
+
+import clvol
+from clvol.scene.records import ConstantEmitter, DirectionalEmitter
+
+SPP = 5000
+"""With 8 x 8 pixels a pass holds 2048 samples of each: two passes and a rest (more on a GPU, less often)."""
+
+
+def scene(albedo=0.9):
+    """Every kind of medium, bound and phase function in one, and two kinds of light."""
+    values = np.random.default_rng(3).uniform(0, 1, (7, 6, 5)) ** 3
+    cube = (0, 0, 0), (1, 1, 1)
+    return picture(
+        [
+            box(*cube, gridded(volume(values, *cube), albedo, hg(0.6), scale=12.0)),
+            ball((0.9, 0.6, 0.4), 0.4, homogeneous(1.5, albedo)),
+        ],
+        [ConstantEmitter((0.8,)), DirectionalEmitter((2.0,), (0.0, -1.0, 0.0))],
+        (0.5, 0.6, -2.0),
+        (0.6, 0.5, 0.5),
+        40.0,
+        (8, 8),
+    )
+
+
+def digest(result):
+    """Hash of every bit a render answers for."""
+    arrays = (result.image, result.variance, result.sum_, result.sum_of_squares, result.aovs["lookups"])
+    return hashlib.sha256(b"".join(np.ascontiguousarray(a).tobytes() for a in arrays)).hexdigest()
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return render(scene(), spp=SPP, seed=7)
+
+
+def test_the_same_seed_gives_the_same_bits_twice(whole):
+    again = clvol.render(scene(), spp=SPP, seed=7)  # a context and kernels of its own
+    assert digest(again) == digest(whole)
+
+
+def test_another_seed_gives_another_picture(whole):
+    for seed in (8, 7 + 2**32, 2**64 - 1):
+        assert (render(scene(), spp=256, seed=seed).image != whole.image).any(axis=2).mean() > 0.9
+
+
+def test_no_two_pixels_and_no_two_samples_share_their_random_numbers(whole):
+    """A furnace-like scene would hide it: here equal numbers would give equal sums in symmetric pixels."""
+    assert len(np.unique(whole.sum_[..., 0])) == whole.sum_[..., 0].size
+    first, second = (render(scene(), samples=(n, 1), seed=7).image for n in (0, 1))
+    assert (first != second).any()
+
+
+@pytest.mark.parametrize("pool", [256, 2048, 40_000])
+def test_the_pool_size_does_not_touch_a_bit(whole, pool):
+    """40,000 slots lengthen the passes as well."""
+    other = render(scene(), spp=SPP, seed=7, pool=pool)
+    assert other.stats["slots"] != whole.stats["slots"]
+    assert digest(other) == digest(whole)
+
+
+THREAD_SCRIPT = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from test_determinism import SPP, digest, scene
+import clvol
+result = clvol.render(scene(), spp=SPP, seed=7)
+print(digest(result), result.metadata["device"], sep="|")
+"""
+
+
+def test_one_and_two_threads_give_the_same_bits(whole):
+    """PoCL reads its number of threads when it is loaded, so that each needs a process of its own."""
+    digests = set()
+    for threads in ("1", "2"):
+        environment = {**os.environ, "POCL_MAX_PTHREAD_COUNT": threads}
+        command = [sys.executable, "-c", THREAD_SCRIPT, str(Path(__file__).parent)]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0, done.stderr
+        digests.add(done.stdout.strip().splitlines()[-1].split("|")[0])
+    assert digests == {digest(whole)}
+
+
+@pytest.mark.parametrize("cut", [SPP // 2, 1237, 1, 4999])
+def test_two_parts_of_the_samples_merge_to_the_whole(whole, cut):
+    parts = [render(scene(), samples=r, seed=7) for r in ((0, cut), (cut, SPP - cut))]
+    merged = clvol.merge(parts[::-1])
+    assert merged.samples == whole.samples
+    np.testing.assert_allclose(merged.sum_, whole.sum_, rtol=1e-12)
+    np.testing.assert_allclose(merged.sum_of_squares, whole.sum_of_squares, rtol=1e-12)
+    np.testing.assert_allclose(merged.image, whole.image, rtol=2e-7)
+    np.testing.assert_allclose(merged.variance, whole.variance, rtol=1e-6)
+    lookups = [np.rint(r.aovs["lookups"] * float(r.samples[1])).sum() for r in (*parts, whole)]
+    assert lookups[0] + lookups[1] == lookups[2]
+    assert sum(p.stats["lookups"] for p in parts) == whole.stats["lookups"]
+
+
+def test_parts_whose_samples_are_whole_numbers_merge_to_the_last_bit():
+    """Absorbing media under a light of 1: each sample is 0 or 1, so that sums are exact."""
+    still = scene(albedo=0.0)
+    parts = [render(still, samples=r, seed=9) for r in ((0, 333), (333, 667))]
+    merged, single = clvol.merge(parts), render(still, spp=1000, seed=9)
+    assert (np.rint(single.sum_ / np.float32(0.8)) > 0).any()
+    for name in ("sum_", "sum_of_squares", "image", "variance"):
+        assert np.array_equal(getattr(merged, name), getattr(single, name)), name
+
+
+def test_a_range_of_all_samples_is_the_render_itself(whole):
+    assert digest(render(scene(), samples=(0, SPP), seed=7)) == digest(whole)
+
+
+def test_samples_are_numbered_up_to_the_end_of_32_bits():
+    last = 2**32 - 2
+    low, high = (render(scene(), samples=r, seed=7) for r in ((0, 1), (last, 1)))
+    assert high.samples == (last, 1)
+    assert (low.image != high.image).any()
+
+
+def interrupted_render(signals=1):
+    """Presses Ctrl-C (`signals` times) when the first pass is reported."""
+    left = [signals]
+
+    def press(progress):
+        while left[0]:
+            left[0] -= 1
+            os.kill(os.getpid(), signal.SIGINT)
+
+    return render(scene(), spp=50 * SPP, seed=7, progress=press)
+
+
+def test_ctrl_c_keeps_whole_passes_of_every_pixel():
+    """What is left has the bits of a shorter render: no pixel has more samples, no path was dropped."""
+    cut = interrupted_render()
+    assert cut.stats["interrupted"]
+    assert 0 < cut.samples[1] < 50 * SPP
+    assert cut.metadata["spp"] == cut.samples[1]
+    assert digest(cut) == digest(render(scene(), spp=cut.samples[1], seed=7))
+
+
+def test_a_second_ctrl_c_is_a_keyboard_interrupt():
+    with pytest.raises(KeyboardInterrupt):
+        interrupted_render(signals=2)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_time_limit_keeps_whole_passes_too():
+    cut = render(scene(), time_limit=0.3, seed=7)
+    assert not cut.stats["interrupted"]
+    assert digest(cut) == digest(render(scene(), spp=cut.samples[1], seed=7))
+
+
+def test_an_interrupted_picture_is_not_biased():
+    assert_same_picture(interrupted_render(), render(scene(), spp=SPP, seed=8))
