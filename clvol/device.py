@@ -50,9 +50,18 @@ class Device:
     def description(self) -> str:
         return f"{self.info.name} ({self.info.platform})"
 
-    @cached_property
-    def max_buffer_bytes(self) -> int:
-        return int(self.queue.device.max_mem_alloc_size)
+    def allocate(self, size: int, what: str, hint: str) -> cl.Buffer:
+        """An uninitialised buffer of `size` bytes; DeviceError where the device has no room for `what`."""
+        limit = int(self.queue.device.max_mem_alloc_size)
+        if size > limit:
+            sizes = f"a buffer of {size / 2**20:.0f} MiB, where {limit / 2**20:.0f} are allowed"
+            raise DeviceError(f"{what} needs {sizes} on {self.description}", hint=hint)
+        try:
+            return cl.Buffer(self.context, cl.mem_flags.READ_WRITE, max(size, 4))
+        except cl.Error as error:
+            raise DeviceError(
+                f"{self.description} has no {size / 2**20:.0f} MiB for {what}", hint=hint
+            ) from error
 
 
 def _found() -> list[tuple[DeviceInfo, cl.Device]]:

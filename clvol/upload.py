@@ -16,7 +16,6 @@ from clvol.accel.kdtree import pack_maximum
 from clvol.config import KernelConfig
 from clvol.device import Device
 from clvol.environment import envmap_distribution, luminance
-from clvol.errors import DeviceError
 from clvol.features import bounding_kind, is_clipped, is_homogeneous, scene_media
 from clvol.film import filter_cdf
 from clvol.prepare import PreparedScene
@@ -96,14 +95,11 @@ def _volume_buffers(device: Device, prepared: PreparedScene) -> dict[str, cl.Buf
         tops.append(bricks.top.reshape(-1) * np.int32(bricks.channels))
         top_offset += bricks.top.size
         brick_offset += bricks.brick_count * bricks.channels
-    pool_bytes = brick_offset * BRICK_SAMPLES * 4
-    if pool_bytes > device.max_buffer_bytes:
-        raise DeviceError(
-            f"the volumes need a buffer of {pool_bytes / 2**20:.0f} MiB, "
-            f"{device.description} allows {device.max_buffer_bytes / 2**20:.0f} MiB",
-            hint="use a device with more memory, or a volume of lower resolution",
-        )
-    pool = cl.Buffer(device.context, cl.mem_flags.READ_ONLY, pool_bytes)
+    pool = device.allocate(
+        brick_offset * BRICK_SAMPLES * 4,
+        "the scene's volumes",
+        "use a device with more memory, or a volume of lower resolution",
+    )
     for record, volume in zip(table, prepared.volumes.values(), strict=True):
         for first, samples in volume.bricks.stored():
             at = (int(record["brick_offset"]) + first * volume.bricks.channels) * BRICK_SAMPLES * 4

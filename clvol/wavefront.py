@@ -80,7 +80,6 @@ class Wavefront:
         self.stride = pool.slots + 16  # off the power of two, or all fields of a slot share a cache set
         self.seconds = dict.fromkeys((*config.stages, "accumulate"), 0.0)
         self.launches = self.waves = 0
-        self.film = np.zeros((self.pixels, config.channels, 4), np.float32)
         self._allocate(buffers)
 
     def _allocate(self, scene_buffers: dict[str, cl.Buffer]) -> None:
@@ -96,13 +95,14 @@ class Wavefront:
         }
         self.buffers = {name: self._buffer(size) for name, size in sizes.items()} | scene_buffers
         self.bytes = sum(sizes.values()) + sum(b.size for b in scene_buffers.values())
-        self.film_buffer = self._buffer(self.film.nbytes)
-        self.film_lookups = self._buffer(8 * self.pixels)
-        for buffer, size in ((self.film_buffer, self.film.nbytes), (self.film_lookups, 8 * self.pixels)):
+        film_bytes = 16 * self.config.channels * self.pixels
+        self.film_buffer, self.film_lookups = self._buffer(film_bytes), self._buffer(8 * self.pixels)
+        for buffer, size in ((self.film_buffer, film_bytes), (self.film_lookups, 8 * self.pixels)):
             cl.enqueue_fill_buffer(self.device.queue, buffer, np.uint32(0), 0, size)
         state = np.zeros((len(self.fields), self.stride), np.uint32)
         state[[f.name for f in self.fields].index("job")] = NO_JOB
         self._write("state", state)
+        self._write("control", np.zeros(_DONE + self.pool.ring_passes, np.uint32))
         values = [
             np.uint32(self.stride) if argument.name == "slot_stride" else self.buffers[argument.name]
             for argument in layout.arguments(self.config)
@@ -111,7 +111,7 @@ class Wavefront:
             self.kernels[stage].set_args(*values)
 
     def _buffer(self, size: int) -> cl.Buffer:
-        return cl.Buffer(self.device.context, cl.mem_flags.READ_WRITE, max(size, 4))
+        return self.device.allocate(size, f"a film of {self.pixels} pixels", "render fewer pixels")
 
     def _write(self, name: str, array: np.ndarray, offset: int = 0) -> None:
         cl.enqueue_copy(self.device.queue, self.buffers[name], array, dst_offset=offset, is_blocking=True)
@@ -181,7 +181,9 @@ class Wavefront:
         self.render["pass_jobs"], self.render["ring_passes"] = pass_jobs, self.pool.ring_passes
         self.render["last_pass"], self.render["last_samples"] = last_pass, last_samples
         self._write("render", self.render)
-        self._write("control", np.zeros(_DONE + self.pool.ring_passes, np.uint32))
+        control = np.zeros(_DONE + self.pool.ring_passes, np.uint32)
+        control[_NON_FINITE] = self.non_finite()  # counts over all rounds
+        self._write("control", control)
         counts = np.zeros((self.groups, layout.COUNTER_STRIDE), np.uint32)
         counts[:, len(layout.ENUMS["QUEUE"])] = self.config.group_slots  # all slots idle
         self._write("counts", counts)
@@ -234,8 +236,9 @@ class Wavefront:
 
     def sums(self) -> tuple[np.ndarray, np.ndarray]:
         """Sums of the samples and of their squares so far, float64 (pixels, channels)."""
-        cl.enqueue_copy(self.device.queue, self.film, self.film_buffer, is_blocking=True)
-        film = self.film.astype(np.float64)
+        film = np.empty((self.pixels, self.config.channels, 4), np.float32)
+        cl.enqueue_copy(self.device.queue, film, self.film_buffer, is_blocking=True)
+        film = film.astype(np.float64)
         return film[..., 0] + film[..., 1], film[..., 2] + film[..., 3]
 
     def lookups(self) -> np.ndarray:

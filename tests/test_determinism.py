@@ -22,7 +22,7 @@ SPP = 5000
 """With 8 x 8 pixels a pass holds 2048 samples of each: two passes and a rest (more on a GPU, less often)."""
 
 
-def scene(albedo=0.9):
+def scene(albedo=0.9, sky=0.8):
     """Every kind of medium, bound and phase function in one, and two kinds of light."""
     values = np.random.default_rng(3).uniform(0, 1, (7, 6, 5)) ** 3
     cube = (0, 0, 0), (1, 1, 1)
@@ -31,10 +31,10 @@ def scene(albedo=0.9):
             box(*cube, gridded(volume(values, *cube), albedo, hg(0.6), scale=12.0)),
             ball((0.9, 0.6, 0.4), 0.4, homogeneous(1.5, albedo)),
         ],
-        [ConstantEmitter((0.8,)), DirectionalEmitter((2.0,), (0.0, -1.0, 0.0))],
+        [ConstantEmitter((sky,)), DirectionalEmitter((2.0,), (0.0, -1.0, 0.0))],
         (0.5, 0.6, -2.0),
         (0.6, 0.5, 0.5),
-        40.0,
+        20.0,
         (8, 8),
     )
 
@@ -102,8 +102,8 @@ def test_two_parts_of_the_samples_merge_to_the_whole(whole, cut):
     parts = [render(scene(), samples=r, seed=7) for r in ((0, cut), (cut, SPP - cut))]
     merged = clvol.merge(parts[::-1])
     assert merged.samples == whole.samples
-    np.testing.assert_allclose(merged.sum_, whole.sum_, rtol=1e-12)
-    np.testing.assert_allclose(merged.sum_of_squares, whole.sum_of_squares, rtol=1e-12)
+    np.testing.assert_allclose(merged.sum_, whole.sum_, rtol=1e-10)
+    np.testing.assert_allclose(merged.sum_of_squares, whole.sum_of_squares, rtol=1e-10)
     np.testing.assert_allclose(merged.image, whole.image, rtol=2e-7)
     np.testing.assert_allclose(merged.variance, whole.variance, rtol=1e-6)
     lookups = [np.rint(r.aovs["lookups"] * float(r.samples[1])).sum() for r in (*parts, whole)]
@@ -113,10 +113,10 @@ def test_two_parts_of_the_samples_merge_to_the_whole(whole, cut):
 
 def test_parts_whose_samples_are_whole_numbers_merge_to_the_last_bit():
     """Absorbing media under a light of 1: each sample is 0 or 1, so that sums are exact."""
-    still = scene(albedo=0.0)
+    still = scene(albedo=0.0, sky=1.0)
     parts = [render(still, samples=r, seed=9) for r in ((0, 333), (333, 667))]
     merged, single = clvol.merge(parts), render(still, spp=1000, seed=9)
-    assert (np.rint(single.sum_ / np.float32(0.8)) > 0).any()
+    assert len(np.unique(single.sum_)) > 10 and (single.sum_ == np.rint(single.sum_)).all()
     for name in ("sum_", "sum_of_squares", "image", "variance"):
         assert np.array_equal(getattr(merged, name), getattr(single, name)), name
 

@@ -151,3 +151,10 @@ def test_constvolume_in_a_heterogeneous_medium_is_clipped_to_its_box():
     result = clvol.render(scene_of(medium, size=(2, 2), sensor=sensor), spp=20_000)
     z = (result.image - np.exp(-1.0)) / np.sqrt(result.variance)
     assert np.abs(z).max() < largest_z(z.size)
+
+
+def test_a_film_too_large_for_the_device_is_a_clear_error():
+    scene = lumpy_scene()
+    huge = replace(scene, film=replace(scene.film, width=65536, height=65536))
+    with pytest.raises(clvol.Error, match=r"film of 4294967296 pixels .* render fewer pixels"):
+        clvol.render(huge, spp=1)
