@@ -54,7 +54,7 @@ def camera_rays(sensor: Perspective, film: Film, centre: np.ndarray, radius: flo
     # local +x is the image's left, local +y its top
     per_pixel = 2 * tangent / film.width
     half_height = tangent * film.height / film.width
-    corner = np.array([tangent + 2 * tangent * offset_x, half_height + 2 * tangent * offset_y, 1.0])
+    corner = np.array([tangent * (1 - 2 * offset_x), half_height * (1 - 2 * offset_y), 1.0])
     base, dx, dy = linear @ corner, linear @ [-per_pixel, 0, 0], linear @ [0, -per_pixel, 0]
     forward = linear[:, 2] / np.linalg.norm(linear[:, 2])
     unit = float(base @ forward)  # depth of a ray at parameter 1; the same for every pixel

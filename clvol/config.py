@@ -42,6 +42,11 @@ class KernelConfig:
         return 1 if self.one_channel_per_path else self.channels
 
     @property
+    def first_weight(self) -> float:
+        """Weight of a new path: a channel chosen with probability 1/3 counts three times."""
+        return 3.0 if self.one_channel_per_path else 1.0
+
+    @property
     def nee(self) -> bool:
         """Next-event estimation: there are lights to sample and media that scatter towards them."""
         f = self.features

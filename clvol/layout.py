@@ -170,6 +170,7 @@ def path_fields(config: KernelConfig) -> list[PathField]:
         ),
         PathField("cut", "u", "statistics of the slot: paths ended by max_depth", features.depth_limited),
         PathField("cut_energy", "f", "statistics of the slot: weight of those paths", features.depth_limited),
+        PathField("largest_weight", "f", "statistics of the slot: largest path weight", features.scattering),
         PathField(
             "exhausted", "u", "statistics of the slot: walks ended by the loop bound", features.heterogeneous
         ),
@@ -177,7 +178,14 @@ def path_fields(config: KernelConfig) -> list[PathField]:
     return [field for field in fields if field.needed]
 
 
-SLOT_STATISTICS = ("violations", "cut", "cut_energy", "exhausted")
+SLOT_STATISTICS = {
+    "violations": np.sum,
+    "cut": np.sum,
+    "cut_energy": np.sum,
+    "largest_weight": np.max,
+    "exhausted": np.sum,
+}
+"""Fields that a slot keeps from path to path, and how those of all slots combine."""
 
 
 @dataclass(frozen=True)

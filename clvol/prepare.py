@@ -58,9 +58,8 @@ def prepare(scene: records.Scene, majorant: str = "auto") -> PreparedScene:
 
 
 def _scene_sphere(scene: records.Scene) -> tuple[np.ndarray, float]:
-    """Centre and radius of a sphere round every medium and point light (or the camera alone)."""
+    """Centre and radius of a sphere round every medium: what rays can meet (else the camera's place)."""
     corners = [corner for s in scene.shapes if s.interior is not None for corner in shape_bounds(s)]
-    corners += [np.asarray(e.position) for e in scene.emitters if isinstance(e, records.PointEmitter)]
     if not corners:
         return scene.sensor.to_world[:3, 3].copy(), 1.0
     lower, upper = np.min(corners, axis=0), np.max(corners, axis=0)
@@ -123,6 +122,11 @@ def _majorant(
     medium: records.Medium, volume: PreparedVolume, kind: str
 ) -> tuple[Bounds, KdTree | None, float]:
     """One medium's majorant of one kind: the lattice it is walked on, its tree, its expected cost."""
+    if not np.isfinite(np.float32(volume.bricks.maximum.max()) * np.float32(medium.scale)):
+        raise SceneError(
+            f"sigma_t times scale {medium.scale:g} is too large for a float",
+            volume.volume.source or medium.name,
+        )
     bounds = with_slack(volume.bricks.minimum, volume.bricks.maximum, BOUND_CELLS)
     extent = np.linalg.norm(np.linalg.inv(volume.world_to_index)[:3, :3], axis=0)
     if kind == "kdtree":

@@ -66,6 +66,8 @@ def _headers(config: KernelConfig, stage: str) -> list[str]:
     if stage == "shade":
         if features.scattering:
             headers.append("phase/phase.h")
+        if features.envmap:
+            headers.append("emitter/envmap.h")
         headers.append("emitter/emitter.h")
     if stage in ("intersect", "shadow_transmittance") and features.media:
         headers.append("geometry/interval.h")

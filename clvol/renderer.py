@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import signal
 import threading
 import time
@@ -104,12 +105,16 @@ def _sample_range(
         first, count = 0, MAX_SAMPLES
     else:
         first, count = 0, scene.spp if spp is None else spp
+    try:
+        first, count = operator.index(first), operator.index(count)
+    except TypeError:
+        raise OptionError("numbers of samples must be whole", hint=f"not {first!r} and {count!r}") from None
     if first < 0 or count < 1 or first + count > MAX_SAMPLES:
         raise OptionError(
             f"cannot render {count} samples per pixel from sample {first} on",
             hint=f"give at least 1 sample, and at most {MAX_SAMPLES} in all",
         )
-    return int(first), int(count)
+    return first, count
 
 
 @contextmanager

@@ -19,6 +19,7 @@ from clvol.prepare import PreparedScene
 from clvol.programs import build_stages
 from clvol.progress import Progress, ProgressCallback
 from clvol.result import Result, mean_and_variance, relative_noise
+from clvol.scene.digest import scene_digest
 from clvol.upload import emitter_order, upload_scene
 from clvol.version import __version__
 from clvol.wavefront import Pool, Progressed, Wavefront
@@ -123,6 +124,7 @@ class Session:
         stats = self._statistics(count, lookups, setup_seconds)
         metadata = {
             "scene": self.prepared.scene.source,
+            "digest": scene_digest(self.prepared.scene),
             **self.choices(),
             "spp": count,
             "seed": self.seed,
@@ -148,6 +150,7 @@ class Session:
             "non_finite": wavefront.non_finite(),
             "majorant_violations": int(slots.get("violations", 0)),
             "walks_exhausted": int(slots.get("exhausted", 0)),
+            "largest_weight": max(self.config.first_weight, slots.get("largest_weight", 0.0)),
             "paths_cut_by_max_depth": int(slots.get("cut", 0)),
             "energy_lost_to_caps": slots.get("cut_energy", 0.0) / paths,
         }

@@ -18,6 +18,7 @@ import pyopencl as cl
 from clvol import layout
 from clvol.config import KernelConfig
 from clvol.device import Device
+from clvol.errors import OptionError
 
 NO_JOB = 0xFFFFFFFF
 _NEXT_JOB, _JOB_LIMIT, _NON_FINITE, _DONE = (layout.enum("CONTROL", n) for n in layout.ENUMS["CONTROL"])
@@ -39,9 +40,11 @@ class Pool:
         """Pool for a device; `slots` is rounded up to whole groups."""
         if slots is None:
             slots = 8192 if device.is_cpu else 1 << 20
+        if not 1 <= slots <= 1 << 26:
+            raise OptionError(f"a pool of {slots} paths", hint="give 1 to 67108864")
         groups = max(1, -(-slots // config.group_slots))
         slots = groups * config.group_slots
-        return cls(slots, pass_jobs=max(1 << 17, 4 * slots))
+        return cls(slots, pass_jobs=4 * slots)
 
 
 @dataclass
@@ -248,14 +251,14 @@ class Wavefront:
         return lookups
 
     def slot_statistics(self) -> dict[str, float]:
-        """Statistics that slots count for themselves, summed over the slots."""
+        """Statistics that slots keep for themselves, combined over the slots."""
         state = np.empty((len(self.fields), self.stride), np.uint32)
         cl.enqueue_copy(self.device.queue, state, self.buffers["state"], is_blocking=True)
         totals = {}
         for field, row in zip(self.fields, state[:, : self.pool.slots], strict=True):
             if field.name in layout.SLOT_STATISTICS:
                 values = row.view(np.float32) if field.kind == "f" else row
-                totals[field.name] = values.sum(dtype=np.float64).item()
+                totals[field.name] = layout.SLOT_STATISTICS[field.name](values.astype(np.float64)).item()
         return totals
 
     def non_finite(self) -> int:

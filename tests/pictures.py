@@ -24,9 +24,6 @@ from clvol.scene.records import (
 UNREACHED_DEPTH = 1_000_000
 ISOTROPIC = Phase()
 
-render = clvol.render
-
-
 # -- scenes ----------------------------------------------------------------------------------------
 
 

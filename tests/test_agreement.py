@@ -9,9 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pictures import ball, box, gridded, hg, picture, render, unit, volume
+from pictures import ball, box, gridded, hg, picture, unit, volume
 from stat_tests import assert_same_picture, image_mean
 
+from clvol import render
 from clvol.accel.bounds import with_slack
 from clvol.scene.records import ConstantEmitter, DirectionalEmitter
 

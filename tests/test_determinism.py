@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pictures import ball, box, gridded, hg, homogeneous, picture, render, volume
+from pictures import ball, box, gridded, hg, homogeneous, picture, volume
 from stat_tests import assert_same_picture
 
 import clvol
@@ -47,30 +47,30 @@ def digest(result):
 
 @pytest.fixture(scope="module")
 def whole():
-    return render(scene(), spp=SPP, seed=7)
+    return clvol.render(scene(), spp=SPP, seed=7)
 
 
 def test_the_same_seed_gives_the_same_bits_twice(whole):
-    again = clvol.render(scene(), spp=SPP, seed=7)  # a context and kernels of its own
+    again = clvol.render(scene(), spp=SPP, seed=7)
     assert digest(again) == digest(whole)
 
 
 def test_another_seed_gives_another_picture(whole):
     for seed in (8, 7 + 2**32, 2**64 - 1):
-        assert (render(scene(), spp=256, seed=seed).image != whole.image).any(axis=2).mean() > 0.9
+        assert (clvol.render(scene(), spp=256, seed=seed).image != whole.image).any(axis=2).mean() > 0.9
 
 
 def test_no_two_pixels_and_no_two_samples_share_their_random_numbers(whole):
     """A furnace-like scene would hide it: here equal numbers would give equal sums in symmetric pixels."""
     assert len(np.unique(whole.sum_[..., 0])) == whole.sum_[..., 0].size
-    first, second = (render(scene(), samples=(n, 1), seed=7).image for n in (0, 1))
+    first, second = (clvol.render(scene(), samples=(n, 1), seed=7).image for n in (0, 1))
     assert (first != second).any()
 
 
 @pytest.mark.parametrize("pool", [256, 2048, 40_000])
 def test_the_pool_size_does_not_touch_a_bit(whole, pool):
     """40,000 slots lengthen the passes as well."""
-    other = render(scene(), spp=SPP, seed=7, pool=pool)
+    other = clvol.render(scene(), spp=SPP, seed=7, pool=pool)
     assert other.stats["slots"] != whole.stats["slots"]
     assert digest(other) == digest(whole)
 
@@ -99,7 +99,7 @@ def test_one_and_two_threads_give_the_same_bits(whole):
 
 @pytest.mark.parametrize("cut", [SPP // 2, 1237, 1, 4999])
 def test_two_parts_of_the_samples_merge_to_the_whole(whole, cut):
-    parts = [render(scene(), samples=r, seed=7) for r in ((0, cut), (cut, SPP - cut))]
+    parts = [clvol.render(scene(), samples=r, seed=7) for r in ((0, cut), (cut, SPP - cut))]
     merged = clvol.merge(parts[::-1])
     assert merged.samples == whole.samples
     np.testing.assert_allclose(merged.sum_, whole.sum_, rtol=1e-10)
@@ -114,20 +114,20 @@ def test_two_parts_of_the_samples_merge_to_the_whole(whole, cut):
 def test_parts_whose_samples_are_whole_numbers_merge_to_the_last_bit():
     """Absorbing media under a light of 1: each sample is 0 or 1, so that sums are exact."""
     still = scene(albedo=0.0, sky=1.0)
-    parts = [render(still, samples=r, seed=9) for r in ((0, 333), (333, 667))]
-    merged, single = clvol.merge(parts), render(still, spp=1000, seed=9)
+    parts = [clvol.render(still, samples=r, seed=9) for r in ((0, 333), (333, 667))]
+    merged, single = clvol.merge(parts), clvol.render(still, spp=1000, seed=9)
     assert len(np.unique(single.sum_)) > 10 and (single.sum_ == np.rint(single.sum_)).all()
     for name in ("sum_", "sum_of_squares", "image", "variance"):
         assert np.array_equal(getattr(merged, name), getattr(single, name)), name
 
 
 def test_a_range_of_all_samples_is_the_render_itself(whole):
-    assert digest(render(scene(), samples=(0, SPP), seed=7)) == digest(whole)
+    assert digest(clvol.render(scene(), samples=(0, SPP), seed=7)) == digest(whole)
 
 
 def test_samples_are_numbered_up_to_the_end_of_32_bits():
     last = 2**32 - 2
-    low, high = (render(scene(), samples=r, seed=7) for r in ((0, 1), (last, 1)))
+    low, high = (clvol.render(scene(), samples=r, seed=7) for r in ((0, 1), (last, 1)))
     assert high.samples == (last, 1)
     assert (low.image != high.image).any()
 
@@ -141,7 +141,7 @@ def interrupted_render(signals=1):
             left[0] -= 1
             os.kill(os.getpid(), signal.SIGINT)
 
-    return render(scene(), spp=50 * SPP, seed=7, progress=press)
+    return clvol.render(scene(), spp=50 * SPP, seed=7, progress=press)
 
 
 def test_ctrl_c_keeps_whole_passes_of_every_pixel():
@@ -150,7 +150,7 @@ def test_ctrl_c_keeps_whole_passes_of_every_pixel():
     assert cut.stats["interrupted"]
     assert 0 < cut.samples[1] < 50 * SPP
     assert cut.metadata["spp"] == cut.samples[1]
-    assert digest(cut) == digest(render(scene(), spp=cut.samples[1], seed=7))
+    assert digest(cut) == digest(clvol.render(scene(), spp=cut.samples[1], seed=7))
 
 
 def test_a_second_ctrl_c_is_a_keyboard_interrupt():
@@ -160,10 +160,10 @@ def test_a_second_ctrl_c_is_a_keyboard_interrupt():
 
 
 def test_a_time_limit_keeps_whole_passes_too():
-    cut = render(scene(), time_limit=0.3, seed=7)
+    cut = clvol.render(scene(), time_limit=0.3, seed=7)
     assert not cut.stats["interrupted"]
-    assert digest(cut) == digest(render(scene(), spp=cut.samples[1], seed=7))
+    assert digest(cut) == digest(clvol.render(scene(), spp=cut.samples[1], seed=7))
 
 
 def test_an_interrupted_picture_is_not_biased():
-    assert_same_picture(interrupted_render(), render(scene(), spp=SPP, seed=8))
+    assert_same_picture(interrupted_render(), clvol.render(scene(), spp=SPP, seed=8))

@@ -13,10 +13,13 @@ from clvol.scene.records import (
     ConstantEmitter,
     ConstVolume,
     DirectionalEmitter,
+    EnvmapEmitter,
+    Film,
     GridVolume,
     Integrator,
     Perspective,
     PointEmitter,
+    ReconstructionFilter,
 )
 
 LIGHTS = (ConstantEmitter((0.5,)), DirectionalEmitter((2.0,), (0.6, -0.8, 0.0)))
@@ -158,3 +161,53 @@ def test_a_film_too_large_for_the_device_is_a_clear_error():
     huge = replace(scene, film=replace(scene.film, width=65536, height=65536))
     with pytest.raises(clvol.Error, match=r"film of 4294967296 pixels .* render fewer pixels"):
         clvol.render(huge, spp=1)
+
+
+def test_the_last_filter_sample_at_the_films_edge_is_still_on_the_film():
+    """Cut filters are inverted up to their last bin, whose width may round to nothing; sample 1572998 of
+    a corner column draws it."""
+    film = Film(16, 16, ReconstructionFilter("gaussian", 7.24, 1.81))
+    scene = replace(
+        scene_of(medium_of(1.0)), film=film, emitters=(EnvmapEmitter(np.ones((3, 2, 3)), np.eye(4)),)
+    )
+    result = clvol.render(scene, samples=(1572998, 1))
+    assert np.isfinite(result.image).all()
+
+
+def test_a_lamp_far_away_is_a_sun():
+    """Lights have no part in the coordinates that positions are taken in."""
+    scene, distance = lumpy_scene(emitters=(DirectionalEmitter((2.0,), (0.6, -0.8, 0.0)),)), 1e7
+    place = (0.5 - 0.6 * distance, 0.5 + 0.8 * distance, 0.5)
+    lamp = replace(scene, emitters=(PointEmitter((2.0 * distance**2,), place),))
+    assert_same_picture(clvol.render(scene, spp=256), clvol.render(lamp, spp=256, seed=1), tile=4)
+
+
+def test_a_coefficient_beyond_floats_is_a_clear_error():
+    values = np.full((4, 4, 4), 1e20, np.float32)
+    for majorant in ("global", "grid", "kdtree"):
+        with pytest.raises(clvol.Error, match="too large for a float"):
+            clvol.render(scene_of(medium_of(values, 1e30)), spp=1, majorant=majorant)
+
+
+def test_energy_lost_to_caps_is_the_share_of_each_path_in_the_image():
+    """A path that follows one of three channels weighs three times as much in a third of the image."""
+    limit = Integrator(max_depth=2)
+    grey = clvol.render(scene_of(medium_of(3.0, albedo=0.9), integrator=limit), spp=256)
+    medium = replace(medium_of(1.0, albedo=0.9), sigma_t=ConstVolume((3.0, 3.0, 3.0001)))
+    coloured = clvol.render(scene_of(medium, integrator=limit), spp=256)
+    lost = [r.stats["energy_lost_to_caps"] for r in (grey, coloured)]
+    assert lost[1] == pytest.approx(lost[0], rel=0.05)
+    assert (grey.stats["largest_weight"], coloured.stats["largest_weight"]) == (1.0, 3.0)
+
+
+def test_pictures_of_different_scenes_do_not_merge():
+    a = clvol.render(scene_of(medium_of(3.0)), samples=(0, 4))
+    b = clvol.render(scene_of(medium_of(9.0)), samples=(4, 4))
+    with pytest.raises(clvol.Error, match="digest"):
+        clvol.merge([a, b])
+
+
+@pytest.mark.parametrize("options", [{"spp": 2.5}, {"samples": (0.5, 2)}, {"pool": -5}])
+def test_numbers_that_make_no_sense_are_refused(options):
+    with pytest.raises(clvol.Error):
+        clvol.render(scene_of(medium_of(1.0)), **options)

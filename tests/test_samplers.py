@@ -17,8 +17,8 @@ from stat_tests import FALSE_ALARM, chi2_p_value
 import clvol
 from clvol import layout
 from clvol.camera import camera_rays
-from clvol.renderer import render_record
 from clvol.scene.records import EnvmapEmitter, Film, Perspective, Phase, ReconstructionFilter
+from clvol.session import render_record
 
 DRAWS = 1 << 20
 RANDOM = "const uint4 k = philox4x32((uint4)(i, 0u, 0u, 0u), (uint2)(11u, 12u));\n"
@@ -242,7 +242,8 @@ def set_g(probe, g):
 
 
 def sampled_phase(probe):
-    """Per draw: 1 - cosine between travel and scattered direction, azimuth, sampled pdf, evaluated pdf."""
+    """Per draw: 1 - cosine of the angle off the peak (which is behind where g < 0), azimuth, sampled pdf,
+    evaluated pdf."""
     out = np.zeros((DRAWS, 4), np.float32)
     body = (
         uniforms("u", "v")
@@ -251,7 +252,7 @@ def sampled_phase(probe):
         const float3 side = (float3)(0.8f, 0.0f, -0.6f), third = cross(wo, side);
         float pdf;
         const float3 wi = phase_sample(scene->media, wo, u, v, &pdf);
-        const float3 h = wo - wi;
+        const float3 h = hg_peak(scene->media->phase_g, wo) - wi;
         const float azimuth = atan2(dot(wi, third), dot(wi, side));
         vstore4((float4)(0.5f * dot(h, h), azimuth, pdf, phase_pdf(scene->media, wo, wi)), i, out0);"""
     )
@@ -283,18 +284,19 @@ def test_henyey_greenstein_directions_follow_the_phase_function(hg_probe, g):
     set_g(hg_probe, g)
     g = float(np.float32(g))
     x, azimuth, pdf, evaluated = sampled_phase(hg_probe)
-    if abs(g) < 0.9999:
-        assert phase_p_value(g, x, azimuth) > FALSE_ALARM
-        assert phase_p_value(g + 0.01 if g < 0.5 else g - 0.01, x, azimuth) < 1e-9
-    cosine = 1 - x
+    a = abs(g)
+    if a < 0.9999:
+        assert phase_p_value(a, x, azimuth) > FALSE_ALARM
+        assert phase_p_value(a + 0.01 if a < 0.5 else a - 0.01, x, azimuth) < 1e-9
+    cosine = (1 - x) * (-1 if g < 0 else 1)
     for n, moment in ((1, cosine), (2, 1.5 * cosine**2 - 0.5)):
         error = moment.std() / np.sqrt(DRAWS) + 1e-7  # 1e-7: directions are floats
         assert abs(moment.mean() - g**n) < 3.9 * error, f"Legendre moment {n}"
     assert np.isfinite(pdf).all() and (pdf > 0).all()
     # near the peak a direction's rounding moves the pdf that is looked up for it
     blur = 3e-7 * np.sqrt(x) + 1e-13
-    tolerance = 1e-5 + 3 * abs(g) * blur / ((1 - g) ** 2 / 2 + g * x)
-    assert (np.abs(evaluated / pdf - 1) < tolerance).mean() == 1
+    tolerance = 1e-5 + 3 * a * blur / ((1 - a) ** 2 / 2 + a * x)
+    assert (np.abs(evaluated / pdf - 1) < tolerance).all()
 
 
 def test_isotropic_directions_are_uniform(device):
@@ -306,26 +308,24 @@ def test_isotropic_directions_are_uniform(device):
 
 @pytest.mark.parametrize("g", GS)
 def test_the_henyey_greenstein_pdf_is_the_formula_and_integrates_to_one(probe, g):
+    """Over the distance from the peak: 1 - cos, or 1 + cos where g < 0."""
     edges = np.concatenate([[0.0], np.geomspace(1e-16, 2.0, 120)])
-    peak = edges if g > 0 else 2 - edges[::-1]
-    x, w = (a.ravel() for a in gauss(peak[:-1], peak[1:], 8))
-    if g < -0.9999:
-        pytest.skip("1 - cosine cannot resolve the backward peak in float32; METHODS names the forward one")
-    x32 = x.astype(np.float32)
-    out = np.zeros(x.size, np.float32)
-    header = ["phase/phase.h"]
-    probe.run(header, f"out0[i] = hg_pdf({float(np.float32(g))!r}f, in0[i]);", [out], [x32])
-    g = float(np.float32(g))
-    exact = (1 - g * g) / (4 * np.pi * ((1 - g) ** 2 + 2 * g * x32.astype(float)) ** 1.5)
-    assert np.abs(out / exact - 1).max() < (2e-6 if g > -0.9 else 1e-4)
-    assert abs(2 * np.pi * (out * w).sum() - 1) < 1e-4
-    np.testing.assert_allclose(hg_value(0.3, 1 - x), (1 - 0.09) / (4 * np.pi * (0.49 + 0.6 * x) ** 1.5), rtol=1e-6)
+    x, w = (a.ravel() for a in gauss(edges[:-1], edges[1:], 8))
+    x32, out, g32 = x.astype(np.float32), np.zeros(x.size, np.float32), float(np.float32(g))
+    a = abs(g32)
+    probe.run(["phase/phase.h"], f"out0[i] = hg_pdf({a!r}f, in0[i]);", [out], [x32])
+    exact = (1 - a * a) / (4 * np.pi * ((1 - a) ** 2 + 2 * a * x32.astype(float)) ** 1.5)
+    assert np.abs(out / exact - 1).max() < 2e-6
+    assert abs(2 * np.pi * (out * w).sum() - 1) < 1e-5
+    if a < 0.9:  # and that is the textbook's form
+        cosine = (1 - x) * np.sign(g32 + 1e-9)
+        np.testing.assert_allclose(exact, hg_value(g32, cosine), rtol=1e-5)
 
 
 def test_the_chi_square_test_rejects_a_wrong_density(hg_probe):
     set_g(hg_probe, 0.5)
     x, azimuth, _, _ = sampled_phase(hg_probe)
-    assert phase_p_value(0.502, x, azimuth) < FALSE_ALARM
+    assert phase_p_value(0.505, x, azimuth) < FALSE_ALARM
     assert phase_p_value(0.5, x, np.abs(azimuth)) < FALSE_ALARM
 
 
@@ -339,6 +339,7 @@ def peaky_map(height=33, width=48, seed=5):
     radiance[height // 3, 0] = 400, 300, 200
     radiance[0] = 30
     radiance[-6:, : width // 2] = 0
+    radiance[-1] = 0.2  # at a pole the column is anyone's guess
     return radiance.astype(np.float32)
 
 
@@ -357,7 +358,7 @@ def map_position(local, shape):
     """Fractional column (0 at the centre of column 0, not wrapped) and row of local directions, float64."""
     height, width = shape[:2]
     u = np.arctan2(local[:, 0], -local[:, 2]) / (2 * np.pi)
-    v = np.arccos(np.clip(local[:, 1], -1, 1)) / np.pi
+    v = np.arctan2(np.hypot(local[:, 0], local[:, 2]), local[:, 1]) / np.pi
     return u * width - 0.5, v * (height - 1)
 
 
@@ -384,10 +385,10 @@ def test_environment_maps_are_read_where_mitsuba_reads_them(sky):
     world = (local @ rotation.T).astype(np.float32)
     out = np.zeros((len(local), 3), np.float32)
     body = "vstore3(envmap_radiance(scene, vload3(i, in0)), i, out0);"
-    probe.run(["emitter/emitter.h"], body, [out], [world])
+    probe.run(["emitter/envmap.h"], body, [out], [world])
     expected = map_radiance(world.astype(float) @ rotation, radiance)
     # a float direction moves a look-up by some 1e-5 cells; the sun's slope is 400 per cell
-    assert np.abs(out - expected).max() < 0.02
+    assert np.abs(out - expected).max() < 0.01
     assert np.median(np.abs(out - expected)) < 1e-5
     shifted = map_radiance(world.astype(float) @ rotation, np.roll(radiance, 1, axis=1))
     assert np.abs(out - shifted).max() > 50
@@ -404,7 +405,7 @@ def sampled_sky(probe):
         out0[5 * i + 3] = pdf;
         out0[5 * i + 4] = envmap_pdf(scene, d);"""
     )
-    probe.run(["emitter/emitter.h"], body, [out])
+    probe.run(["emitter/envmap.h"], body, [out])
     return out[:, :3].astype(float), out[:, 3].astype(float), out[:, 4].astype(float)
 
 
@@ -424,7 +425,8 @@ def test_environment_maps_are_sampled_by_their_pdf(sky):
     column, row = map_position(local, radiance.shape)
     rows, width = len(radiance) - 1, radiance.shape[1]
     # four quarters of every cell: the density within a cell is flat in (column, row)
-    x, y = np.floor(2 * column).astype(int) % (2 * width), np.minimum(np.floor(2 * row).astype(int), 2 * rows - 1)
+    x = np.floor(2 * column).astype(int) % (2 * width)
+    y = np.minimum(np.floor(2 * row).astype(int), 2 * rows - 1)
     observed = np.bincount(y * 2 * width + x, minlength=4 * rows * width)
     expected = np.repeat(np.repeat(expected_cells(radiance), 2, 0), 2, 1) / 4
     # rounding may move a draw over a border into a cell of no light
@@ -448,7 +450,7 @@ def test_the_pdf_of_an_environment_map_integrates_to_one(sky):
     local = np.stack([np.sin(theta) * np.sin(phi), np.cos(theta), -np.sin(theta) * np.cos(phi)], -1)
     world = (local.reshape(-1, 3) @ rotation.T).astype(np.float32)
     out = np.zeros(len(world), np.float32)
-    probe.run(["emitter/emitter.h"], "out0[i] = envmap_pdf(scene, vload3(i, in0));", [out], [world])
+    probe.run(["emitter/envmap.h"], "out0[i] = envmap_pdf(scene, vload3(i, in0));", [out], [world])
     solid_angle = np.sin(theta) * (w_row * np.pi / rows)[:, None] * np.pi / width
     assert abs((out * solid_angle.ravel()).sum() - 1) < 1e-4
 

@@ -25,13 +25,13 @@ from pictures import (
     homogeneous,
     mean_and_error,
     picture,
-    render,
     spectrum,
     unit,
     volume,
 )
 from stat_tests import assert_same_picture
 
+from clvol import render
 from clvol.scene.records import ConstantEmitter, DirectionalEmitter, EnvmapEmitter, PointEmitter
 
 RGB = np.array([0.7, 1.0, 1.6])

@@ -2,9 +2,6 @@
 #ifndef CLVOL_EMITTER_H
 #define CLVOL_EMITTER_H
 #include "core/sampling.h"
-#if CLVOL_HAS_ENVMAP
-#include "emitter/envmap.h"
-#endif
 
 /* An rgb value as the path carries it. */
 INLINE Spectrum to_spectrum(float3 rgb, uint channel)

@@ -13,14 +13,15 @@ INLINE float2 envmap_position(const Scene *scene, float3 direction)
     const float width = (float)scene->envmap->size[0], height = (float)scene->envmap->size[1];
     float column = atan2(d.x, -d.z) * (0.5f / PI) * width - 0.5f;
     column -= floor(column / width) * width;
-    return (float2)(column, acos(clamp(d.y, -1.0f, 1.0f)) * (1.0f / PI) * (height - 1.0f));
+    const float polar = atan2(sqrt(d.x * d.x + d.z * d.z), d.y); /* acos(d.y) is blind near the poles */
+    return (float2)(column, polar * (1.0f / PI) * (height - 1.0f));
 }
 
 INLINE float3 envmap_radiance(const Scene *scene, float3 direction)
 {
     const int width = scene->envmap->size[0], height = scene->envmap->size[1];
     const float2 p = envmap_position(scene, direction);
-    const int x0 = min((int)p.x, width - 1), y0 = min((int)p.y, height - 2);
+    const int x0 = clamp_int((int)p.x, 0, width - 1), y0 = clamp_int((int)p.y, 0, height - 2);
     const int x1 = x0 + 1 < width ? x0 + 1 : 0;
     const float fx = p.x - (float)x0, fy = p.y - (float)y0;
     __global const float *t = scene->env_texels;
@@ -56,7 +57,8 @@ INLINE float envmap_cell_pdf(const Scene *scene, int x, int y, float sine)
 INLINE float envmap_pdf(const Scene *scene, float3 direction)
 {
     const float2 p = envmap_position(scene, direction);
-    const int x = min((int)p.x, scene->envmap->size[0] - 1), y = min((int)p.y, scene->envmap->size[1] - 2);
+    const int x = clamp_int((int)p.x, 0, scene->envmap->size[0] - 1);
+    const int y = clamp_int((int)p.y, 0, scene->envmap->size[1] - 2);
     return envmap_cell_pdf(scene, x, y, sin(p.y * PI / (float)(scene->envmap->size[1] - 1)));
 }
 

@@ -5,8 +5,11 @@
 #define CLVOL_PHASE_H
 #include "core/sampling.h"
 
-/* 1 - cos and 1 + cos of the Henyey-Greenstein inversion, without cancellation for |g| -> 1 and
-   without a branch at g = 0 (METHODS §7). */
+/* Henyey-Greenstein.  A negative g is the lobe of -g about the opposite direction: hg_sample and hg_pdf
+   take |g| and measure from the peak, so that nothing cancels for |g| -> 1 (METHODS §7). */
+INLINE float3 hg_peak(float g, float3 wo) { return with_sign(1.0f, g) * wo; }
+
+/* 1 - cos and 1 + cos by inversion, without a branch at g = 0. */
 INLINE float2 hg_sample(float g, float u)
 {
     const float denominator = 1.0f - g + 2.0f * g * u;
@@ -26,8 +29,8 @@ INLINE float hg_pdf(float g, float one_minus_cos)
 INLINE float phase_pdf(__global const Medium *medium, float3 wo, float3 wi)
 {
     if (CLVOL_HAS_HG && (!CLVOL_HAS_ISOTROPIC || medium->phase_kind == PHASE_HG)) {
-        const float3 half_difference = wo - wi; /* |wo - wi|² / 2 = 1 - cos, exact near the forward peak */
-        return hg_pdf(medium->phase_g, 0.5f * dot(half_difference, half_difference));
+        const float3 difference = hg_peak(medium->phase_g, wo) - wi; /* half its square is 1 - cos, exactly so near 0 */
+        return hg_pdf(abs_of(medium->phase_g), 0.5f * dot(difference, difference));
     }
     return INV_FOUR_PI;
 }
@@ -35,11 +38,12 @@ INLINE float phase_pdf(__global const Medium *medium, float3 wo, float3 wi)
 INLINE float3 phase_sample(__global const Medium *medium, float3 wo, float u, float v, float *pdf)
 {
     if (CLVOL_HAS_HG && (!CLVOL_HAS_ISOTROPIC || medium->phase_kind == PHASE_HG)) {
-        const float2 cosine = hg_sample(medium->phase_g, u);
+        const float g = abs_of(medium->phase_g);
+        const float2 cosine = hg_sample(g, u);
         const float sine = sqrt(cosine.x * cosine.y);
         const float2 turn = cos_sin_turn(v);
-        *pdf = hg_pdf(medium->phase_g, cosine.x);
-        return normalize(to_frame(wo, sine * turn.x, sine * turn.y, 1.0f - cosine.x));
+        *pdf = hg_pdf(g, cosine.x);
+        return normalize(to_frame(hg_peak(medium->phase_g, wo), sine * turn.x, sine * turn.y, 1.0f - cosine.x));
     }
     *pdf = INV_FOUR_PI;
     return sphere_direction(u, v);

@@ -32,13 +32,13 @@ INLINE float filter_offset(const Scene *scene, uint k, int pixel, int pixels)
     const float per_unit = (float)bins / (2.0f * radius);
     float lower = 0.0f, upper = 1.0f;
     if (!scene->render->sample_border) {
-        const float from = clamp((radius - 0.5f - (float)pixel) * per_unit, 0.0f, (float)bins);
-        const float to = clamp((radius - 0.5f + (float)(pixels - pixel)) * per_unit, 0.0f, (float)bins);
-        const int a = min((int)from, bins - 1), b = min((int)to, bins - 1);
+        const float from = clamp_to((radius - 0.5f - (float)pixel) * per_unit, 0.0f, (float)bins);
+        const float to = clamp_to((radius - 0.5f + (float)(pixels - pixel)) * per_unit, 0.0f, (float)bins);
+        const int a = min_int((int)from, bins - 1), b = min_int((int)to, bins - 1);
         lower = lerp(scene->filter_cdf[a], scene->filter_cdf[a + 1], from - (float)a);
         upper = lerp(scene->filter_cdf[b], scene->filter_cdf[b + 1], to - (float)b);
     }
-    const float u = lerp(lower, upper, uniform_below_one(k));
+    const float u = min_of(lerp(lower, upper, uniform_below_one(k)), 0x1.fffffep-1f); /* below the last bin's end */
     int first = 0, last = bins - 1;
     while (first < last) {
         const int middle = (first + last) >> 1;

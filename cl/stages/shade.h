@@ -112,7 +112,7 @@ INLINE bool scatter(const Scene *scene, uint group, uint slot, SampleKey key, __
 #if CLVOL_HAS_MAX_DEPTH
     if (key.bounce >= scene->render->max_depth) {
         set_path_cut(scene, slot, path_cut(scene, slot) + 1);
-        set_path_cut_energy(scene, slot, path_cut_energy(scene, slot) + spectrum_mean(beta));
+        set_path_cut_energy(scene, slot, path_cut_energy(scene, slot) + spectrum_mean(beta) / FIRST_WEIGHT);
         return false;
     }
 #endif
@@ -133,6 +133,8 @@ INLINE bool scatter(const Scene *scene, uint group, uint slot, SampleKey key, __
 #endif
     set_path_direction(scene, slot, wi);
     set_beta(scene, slot, beta);
+    if (spectrum_max(beta) > path_largest_weight(scene, slot))
+        set_path_largest_weight(scene, slot, spectrum_max(beta));
 #if CLVOL_HAS_MANY_MEDIA
     set_path_interval(scene, slot, 0);
 #endif

@@ -8,6 +8,7 @@ from clvol.scene.files import find_parameter
 from clvol.scene.image import image_from_array, read_image
 from clvol.scene.reader import Reader
 from clvol.scene.records import ConstantEmitter, DirectionalEmitter, EnvmapEmitter, PointEmitter
+from clvol.scene.transforms import keeps_angles
 
 NEGLIGIBLE = 1e-5
 """Share of the brightest value down to which negative values are rounding (colours out of the gamut)."""
@@ -45,7 +46,10 @@ def envmap(reader: Reader) -> EnvmapEmitter:
     if broken.any():
         row, column = np.argwhere(broken)[0][:2]
         reader.fail(f"radiance must be finite and >= 0; it is not at row {row}, column {column}", place)
-    return EnvmapEmitter(np.maximum(radiance, 0), reader.transform(), source)
+    to_world = reader.transform()
+    if not keeps_angles(to_world):
+        reader.fail("to_world of an envmap must not stretch or shear it", "to_world", "rotate it only")
+    return EnvmapEmitter(np.maximum(radiance, 0), to_world, source)
 
 
 def directional(reader: Reader) -> DirectionalEmitter:

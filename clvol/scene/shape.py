@@ -6,7 +6,7 @@ import numpy as np
 
 from clvol.scene.reader import Reader
 from clvol.scene.records import Medium, Shape
-from clvol.scene.transforms import scale, translate
+from clvol.scene.transforms import keeps_angles, scale, translate
 
 
 def null(reader: Reader) -> str:
@@ -25,8 +25,7 @@ def sphere(reader: Reader) -> Shape:
     center = reader.vector("center", (0.0, 0.0, 0.0))
     radius = reader.number("radius", 1.0, minimum=0.0, open_interval=True)
     matrix = reader.transform()
-    gram = matrix[:3, :3].T @ matrix[:3, :3]
-    if not np.allclose(gram / gram[0, 0], np.eye(3), atol=1e-4):
+    if not keeps_angles(matrix):
         reader.fail(
             "to_world of a sphere must not stretch or shear it",
             "to_world",

@@ -117,3 +117,9 @@ def _number(value: float, what: str) -> float:
     if not np.isfinite(number):
         raise SceneError(f"{what}: expected a finite number, got {value!r}")
     return number
+
+
+def keeps_angles(matrix: np.ndarray) -> bool:
+    """Whether a 4x4 transform rotates, mirrors and scales all axes alike, and nothing else."""
+    gram = matrix[:3, :3].T @ matrix[:3, :3]
+    return bool(np.allclose(gram / gram[0, 0], np.eye(3), atol=1e-4))

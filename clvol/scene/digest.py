@@ -1,0 +1,39 @@
+"""A short fingerprint of a scene, so that results of different scenes are not taken for one another."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import fields, is_dataclass
+
+import numpy as np
+
+_MOST_VALUES = 1 << 20
+"""Of a larger array this many values, evenly spaced, are looked at."""
+
+
+def scene_digest(scene: object) -> str:
+    """16 hexadecimal digits that depend on every record of the scene, but for where it was read from,
+    its sample count and its seed."""
+    state = hashlib.blake2b(digest_size=8)
+    _feed(state, scene)
+    return state.hexdigest()
+
+
+def _feed(state: hashlib.blake2b, value: object) -> None:
+    if isinstance(value, np.ndarray):
+        flat = value.reshape(-1)
+        step = -(-flat.size // _MOST_VALUES) or 1
+        state.update(repr((value.shape, value.dtype.str)).encode())
+        state.update(np.ascontiguousarray(flat[::step]).tobytes())
+    elif is_dataclass(value):
+        state.update(type(value).__name__.encode())
+        for field in fields(value):
+            if field.name not in ("source", "name", "spp", "seed", "choices"):
+                state.update(field.name.encode())
+                _feed(state, getattr(value, field.name))
+    elif isinstance(value, tuple | list):
+        state.update(f"[{len(value)}]".encode())
+        for item in value:
+            _feed(state, item)
+    else:
+        state.update(repr(value).encode())
