@@ -416,6 +416,17 @@ def test_envmaps_are_linear_rgb_times_scale(tmp_path):
     assert (loaded.dtype, loaded.shape) == (np.float32, (4, 2, 3))
 
 
+def test_a_stretched_environment_is_an_error():
+    """Its solid angles would no longer be those the light is sampled with."""
+    sky = np.ones((3, 4, 3))
+    assert "must not stretch" in error_of(e={"type": "envmap", "bitmap": sky, "to_world": scale([1, 3, 1])})
+    emitter(type="envmap", bitmap=sky, to_world=rotate([0, 1, 0], 30) @ scale(2))
+
+
+def test_choices_that_do_not_exist_yet_are_unknown_parameters():
+    assert "probability" in error_of(integrator={"type": "volpath", "probability": "history"})
+
+
 def test_rounding_below_zero_in_an_envmap_becomes_zero():
     sky = np.full((3, 4, 3), 1000.0)
     sky[0, 0] = -1e-3
