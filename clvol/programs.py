@@ -75,10 +75,13 @@ def _headers(config: KernelConfig, stage: str) -> list[str]:
 
 
 def compose(config: KernelConfig, headers: list[str], body: str) -> str:
-    """A translation unit: defines, layout, `headers`, then `body` (OpenCL text)."""
+    """A translation unit: defines, layout, `headers`, then `body` (OpenCL text).
+
+    Only the macros that occur in it are defined: caches are keyed on the text, and stages that a choice
+    does not touch are not built again.
+    """
     seen: set[str] = set()
-    lines = ["/* Composed by clvol. */"]
-    lines += [f"#define {name} {value}" for name, value in config.defines().items()]
+    lines = []
     for name in ("core/types.h", "core/random.h"):
         lines += _expand(name, seen)
     lines += ['#line 1 "layout"', *layout.layout_text(config).splitlines()]
@@ -87,7 +90,10 @@ def compose(config: KernelConfig, headers: list[str], body: str) -> str:
     for line in body.splitlines():
         match = _INCLUDE.match(line)
         lines += _expand(match[1], seen) if match else [line]
-    return "\n".join(lines) + "\n"
+    text = "\n".join(lines) + "\n"
+    used = set(re.findall(r"\bCLVOL_\w+", text))
+    defines = [f"#define {name} {value}\n" for name, value in config.defines().items() if name in used]
+    return "/* Composed by clvol. */\n" + "".join(defines) + text
 
 
 def stage_source(config: KernelConfig, stage: str) -> str:

@@ -122,7 +122,7 @@ INLINE bool scatter(const Scene *scene, uint group, uint slot, SampleKey key, __
     const uint4 k = decision_block(render_seed(scene), key, BLOCK_DIRECTION, 0);
     if (key.bounce > scene->render->rr_depth) {
         const float survival = min_of(1.0f, spectrum_max(beta));
-        if (!(uniform_float(k.z) < survival))
+        if (survival < 1.0f && !(uniform_float(k.z) < survival)) /* uniform_float may round to 1 */
             return false;
         beta /= survival;
     }
