@@ -18,6 +18,7 @@ from clvol.cli_options import (
     choice_option,
     finite,
 )
+from clvol.errors import Error
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -136,14 +137,26 @@ def render(
         loaded = clvol.load_file(scene, **dict(definitions))
         with nullcontext(False) if quiet else RichProgress(console) as progress:
             result = clvol.render(loaded, spp=spp, time_limit=time_limit, progress=progress, **options)
-        for output in outputs:
-            result.save(output, exposure=exposure)
+        failures = _save_all(result, outputs, exposure)
     interrupted = bool(result.stats.get("interrupted"))
     if interrupted:
         click.echo(f"clvol: interrupted after {result.samples[1]} spp, saved what there is", err=True)
     if not quiet:
         click.echo("\n".join(_summary(result, outputs)))
+    for failure in failures:
+        raise failure
     click.get_current_context().exit(INTERRUPTED if interrupted else 0)
+
+
+def _save_all(result: Result, outputs: tuple[str, ...], exposure: float) -> list[Error]:
+    """Write every picture that can be written; return what went wrong with the others."""
+    failures = []
+    for output in outputs:
+        try:
+            result.save(output, exposure=exposure)
+        except Error as error:
+            failures.append(error)
+    return failures
 
 
 @contextmanager

@@ -6,6 +6,7 @@ import json
 import logging
 import os
 import secrets
+import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from os import PathLike
@@ -48,8 +49,12 @@ def check_output(path: str | PathLike[str]) -> None:
     folder = target.parent
     if not folder.is_dir():
         raise OptionError(f"no such folder '{folder}'", where=str(path), hint="make it first")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise OptionError(f"no permission to write to '{folder}'", where=str(path), hint="choose another one")
+    try:  # the only sure way to know
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        reason = f"cannot write to '{folder}': {error.strerror}"
+        raise OptionError(reason, where=str(path), hint="choose another folder") from None
 
 
 def split_channels(name: str, image: np.ndarray) -> dict[str, np.ndarray]:

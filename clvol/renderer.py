@@ -58,6 +58,10 @@ def render(
     ------
     OptionError, SceneError, VolumeError, DeviceError : a choice, scene, volume or device that won't do.
     """
+    if not isinstance(scene, Scene):
+        raise OptionError(
+            f"render takes a Scene, not {type(scene).__name__}", hint="make one with load_file or load_dict"
+        )
     chosen = {
         "technique": technique,
         "transmittance": transmittance,
@@ -75,6 +79,7 @@ def render(
     prepared = prepare(scene, choices["majorant"])
     session = Session.open(opened, prepared, choices, seed, pool)
     session.describe()
+    session.warn_of_unused(chosen)
     setup_seconds = time.perf_counter() - started
     bar = RichProgress() if progress is True else nullcontext(progress or None)
     with bar as callback, _interrupt_flag() as interrupted:
@@ -100,6 +105,8 @@ def _sample_range(
     if time_limit is not None and not time_limit > 0:
         raise OptionError(f"time limit {time_limit} is not a positive number of seconds")
     if samples is not None:
+        if not isinstance(samples, tuple | list) or len(samples) != 2:
+            raise OptionError(f"samples={samples!r} is not a pair", hint="give (first, count)")
         first, count = samples
     elif time_limit is not None and spp is None:
         first, count = 0, MAX_SAMPLES

@@ -117,6 +117,13 @@ class Result:
             sum_of_squares=sum_of_squares,
         )
 
+    def __repr__(self) -> str:
+        height, width = self.image.shape[:2]
+        keys = ("technique", "transmittance", "majorant")
+        how = [str(self.metadata[key]) for key in keys if key in self.metadata]
+        about = f"{width} x {height}, {self.samples[1]} spp, noise {self.noise:.2%}"
+        return f"<Result {', '.join([about, *how])}>"
+
     @property
     def noise(self) -> float:
         """Mean relative standard error of the image (`relative_noise`)."""
@@ -158,6 +165,8 @@ def merge(results: Iterable[Result]) -> Result:
     OptionError
         No results; overlapping sample ranges; or another size, scene, seed or choice: which, it says.
     """
+    if isinstance(results, Result):
+        raise OptionError("merge takes a list of results", hint="merge([a, b])")
     results = sorted(results, key=lambda result: result.ranges)
     if not results:
         raise OptionError("nothing to merge", hint="give at least one result")

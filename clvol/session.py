@@ -51,6 +51,7 @@ class Session:
         buffers = upload_scene(device, prepared, config)
         record = render_record(prepared, seed)
         wavefront = Wavefront(device, config, kernels, buffers, record, Pool.for_device(device, config, pool))
+        wavefront.warm_up()
         return cls(device, prepared, config, wavefront, seed)
 
     def describe(self) -> None:
@@ -71,6 +72,20 @@ class Session:
             wavefront.groups,
             wavefront.bytes / 2**20,
         )
+
+    def warn_of_unused(self, asked: dict[str, str]) -> None:
+        """Say which of the caller's own choices this scene has no use for, and what leaves it black."""
+        used = self.choices()
+        for family, value in asked.items():
+            if value not in ("auto", used[family]):
+                log.warning(
+                    "%s %s is not used: the scene's media need %s",
+                    family,
+                    value,
+                    "none" if used[family] == "none" else f"only the {used[family]} rule",
+                )
+        if not self.config.features.emitters:
+            log.warning("the scene has no emitter: its picture is black")
 
     def choices(self) -> dict[str, str]:
         """The choices in force; "none" where the scene has no use for one."""
@@ -154,9 +169,16 @@ class Session:
             "paths_cut_by_max_depth": int(slots.get("cut", 0)),
             "energy_lost_to_caps": slots.get("cut_energy", 0.0) / paths,
         }
+        if (
+            self.config.features.heterogeneous
+            and not stats["lookups"]
+            and not self.config.features.homogeneous
+        ):
+            log.warning("no path met any density: are the transforms right?")
         for name in ("non_finite", "majorant_violations", "walks_exhausted"):
             if stats[name]:
                 log.warning("%s: %d", name.replace("_", " "), stats[name])
+        log.info("set-up (kernels, volumes, majorants) %8.3f seconds", setup_seconds)
         for stage, seconds in wavefront.seconds.items():
             log.info("stage %-20s %8.3f seconds", stage, seconds)
         return stats

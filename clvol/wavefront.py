@@ -179,6 +179,15 @@ class Wavefront:
             if finished == passes or (finished == begun and begun and should_stop()):
                 return sum(samples[:finished])
 
+    def warm_up(self) -> None:
+        """Run every kernel once with nothing to do: some drivers (PoCL) compile at the first launch, which
+        is part of setting up and not of the render."""
+        self._start_round(0, self.pass_samples * self.pixels, 0, self.pass_samples)
+        self._launch(1)
+        self._accumulate(0, 0)
+        self.seconds = dict.fromkeys(self.seconds, 0.0)
+        self.launches = self.waves = 0
+
     def _start_round(self, first: int, pass_jobs: int, last_pass: int, last_samples: int) -> None:
         self.render["first_sample"], self.render["pass_samples"] = first, self.pass_samples
         self.render["pass_jobs"], self.render["ring_passes"] = pass_jobs, self.pool.ring_passes

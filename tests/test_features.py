@@ -205,8 +205,8 @@ def test_grey_scenes_carry_one_channel_and_smaller_paths(device):
     grey = config_of(device, scene([fog()], [SUN]))
     coloured_light = config_of(device, scene([fog()], [DirectionalEmitter((1, 0.5, 0.2), (0, -1, 0))]))
     assert (grey.channels, coloured_light.channels) == (1, 3)
-    assert "#define CLVOL_CHANNELS 1\n" in programs.stage_source(grey, "shade")
-    assert "#define CLVOL_CHANNELS 3\n" in programs.stage_source(coloured_light, "shade")
+    assert "#define CLVOL_CHANNELS 1\n" in programs.stage_source(grey, "generate")
+    assert "#define CLVOL_CHANNELS 3\n" in programs.stage_source(coloured_light, "generate")
     # beta, radiance and the shadow ray's light: three numbers each instead of one
     assert bytes_per_slot(coloured_light) - bytes_per_slot(grey) == 4 * 3 * 2
 

@@ -262,7 +262,7 @@ REFUSED = [
     ('<path value="nowhere"/>', "folder 'nowhere' does not exist"),
     ('<float name="x" value="1"/>', "unknown parameter 'x' of the scene"),
     ("some text", "unexpected text"),
-    ('<emitter type="constant">', "not well-formed XML"),
+    ('<emitter type="constant">', "broken XML"),
     ("<shape type='cube'>" * 5000 + "</shape>" * 5000, "nested"),
 ]
 

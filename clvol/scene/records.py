@@ -174,3 +174,8 @@ class Scene:
     spp: int = 4
     seed: int = 0
     source: str = ""  # file the scene came from, for messages and metadata
+
+    def __repr__(self) -> str:
+        picture = f"{self.film.width} x {self.film.height}, {self.spp} spp"
+        content = f"{len(self.shapes)} shapes, {len(self.emitters)} lights"
+        return f"<Scene {self.source or 'from a dict'}: {picture}, {content}>"

@@ -39,6 +39,7 @@ MAX_TEXT = 2**20
 """Longest attribute after its $names are replaced: defaults made of defaults can grow without end."""
 MAX_FILES = 1000
 """Most files one scene may include, counted as often as they are."""
+VOLUME_SUFFIXES = (".vdb", ".nvdb", ".vol", ".npy", ".npz")
 _NAMELESS = "_arg_"
 _REFERENCE = re.compile(r"(?<!\\)\$(\w*)", re.ASCII)
 
@@ -52,7 +53,13 @@ def read_xml(path: Path, keywords: Mapping[str, object]) -> Node:
         With file and line.
     """
     if not path.is_file():
+        if path.is_dir():
+            raise SceneError(f"'{path}' is a folder, not a scene file", hint="name the .xml file in it")
         raise SceneError(f"scene file '{path}' does not exist")
+    if path.suffix.lower() in VOLUME_SUFFIXES:
+        raise SceneError(
+            f"'{path}' is a volume, not a scene", hint="`clvol info` shows it; a scene's medium can name it"
+        )
     reader = _XmlReader(keywords)
     root = reader.file(path, [], "")
     if root.kind != "scene":

@@ -45,7 +45,7 @@ def parse_elements(path: Path) -> Element:
         parser.Parse(text, True)
     except expat.ExpatError as error:
         reason = expat.ErrorString(error.code)
-        raise SceneError(f"not well-formed XML: {reason}", f"{path}:{error.lineno}") from None
+        raise SceneError(f"broken XML: {reason}", f"{path}:{error.lineno}") from None
     except (LookupError, ValueError) as error:  # encodings that expat leaves to Python
         raise SceneError(f"cannot decode the scene file: {error}", str(path), "save it as UTF-8") from None
     return tree.open[0].children[0]
