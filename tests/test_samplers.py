@@ -252,7 +252,7 @@ def sampled_phase(probe):
         const float3 side = (float3)(0.8f, 0.0f, -0.6f), third = cross(wo, side);
         float pdf;
         const float3 wi = phase_sample(scene->media, wo, u, v, &pdf);
-        const float3 h = hg_peak(scene->media->phase_g, wo) - wi;
+        const float3 h = (scene->media->phase_g < 0.0f ? -wo : wo) - wi;
         const float azimuth = atan2(dot(wi, third), dot(wi, side));
         vstore4((float4)(0.5f * dot(h, h), azimuth, pdf, phase_pdf(scene->media, wo, wi)), i, out0);"""
     )

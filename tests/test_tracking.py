@@ -192,3 +192,18 @@ def test_a_majorant_too_low_by_a_tenth_is_caught(device):
     assert violations.sum() > 0
     tau = optical_depth(FIELDS["constant"](), *ray, length, 1.5)
     assert collision_p_value(distances, tau, length) < FALSE_ALARM
+
+
+@pytest.mark.parametrize("transmittance", ESTIMATED)
+def test_small_transmittances_survive_roulette(device, transmittance):
+    """Where most walks come below the roulette's threshold: an error of 1 % in a survivor's weight shows."""
+    probe = Probe(device, scene_of(medium_of(FIELDS["ramp"](), 6.0)), majorant="global")
+    ray, walks = RAYS["oblique"], 1 << 22
+    length = exit_distance(*ray)
+    headers = headers_of("global", registry.TRANSMITTANCES[transmittance].header)
+    values, _ = walk(probe, headers, TRANSMITTANCE_BODY, ray, length, walks=walks)
+    exact = np.exp(-optical_depth(FIELDS["ramp"](), *ray, length, 6.0)[-1])
+    error = values.var(dtype=float) / walks
+    assert exact < 0.1
+    assert abs(z_score(values.mean(dtype=float), error, exact)) < largest_z(1)
+    assert z_score(values.mean(dtype=float), error, 0.99 * exact) > largest_z(1)
