@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from pictures import ball, box, gridded, hg, homogeneous, picture, volume
 from stat_tests import assert_same_picture
 
 import clvol
+from clvol import session
 from clvol.scene.records import ConstantEmitter, DirectionalEmitter
 
 SPP = 1300
@@ -73,6 +75,15 @@ def test_no_two_pixels_and_no_two_samples_share_their_random_numbers(whole):
     assert (first != second).any()
 
 
+def test_the_launch_geometry_of_a_gpu_does_not_touch_a_bit(whole, monkeypatch):
+    """Work-groups of 64 that share a queue, as on a GPU, where a CPU runs groups of one."""
+    chosen = session.kernel_config
+    monkeypatch.setattr(
+        session, "kernel_config", lambda *a: replace(chosen(*a), local_size=64, group_slots=512)
+    )
+    assert digest(clvol.render(scene(), spp=SPP, seed=7)) == digest(whole)
+
+
 @pytest.mark.parametrize("pool", [256, 40_000])
 def test_the_pool_size_does_not_touch_a_bit(whole, pool):
     """40,000 slots lengthen the passes as well."""
@@ -86,6 +97,7 @@ import sys
 sys.path.insert(0, sys.argv[1])
 from test_determinism import SPP, digest, scene
 import clvol
+from clvol import session
 result = clvol.render(scene(), spp=SPP, seed=7)
 print(digest(result), result.metadata["device"], sep="|")
 """
