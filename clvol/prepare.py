@@ -122,7 +122,7 @@ def _majorant(
     medium: records.Medium, volume: PreparedVolume, kind: str
 ) -> tuple[Bounds, KdTree | None, float]:
     """One medium's majorant of one kind: the lattice it is walked on, its tree, its expected cost."""
-    if float(volume.bricks.maximum.max()) * medium.scale > np.finfo(np.float32).max:
+    if float(volume.bricks.maximum.max()) * medium.scale > float(np.finfo(np.float32).max):
         raise SceneError(
             f"sigma_t times scale {medium.scale:g} is too large for a float",
             volume.volume.source or medium.name,
