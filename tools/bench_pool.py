@@ -46,7 +46,6 @@ def show_pool(figures: Figures) -> None:
     columns = [
         "slots",
         "launches",
-        "bytes/slot",
         *(s.replace("_", " ") for s in stages),
         "render",
         "M paths/s",

@@ -7,8 +7,9 @@ from dataclasses import fields, is_dataclass
 
 import numpy as np
 
-_MOST_VALUES = 1 << 20
-"""Of a larger array this many values, evenly spaced, are looked at."""
+_BLOCKS, _BLOCK_VALUES = 256, 4096
+"""Of a larger array this many blocks of so many values, evenly spread, are looked at: a volume that is
+mapped from its file is not read whole again."""
 
 
 def scene_digest(scene: object) -> str:
@@ -22,9 +23,12 @@ def scene_digest(scene: object) -> str:
 def _feed(state: hashlib.blake2b, value: object) -> None:
     if isinstance(value, np.ndarray):
         flat = value.reshape(-1)
-        step = -(-flat.size // _MOST_VALUES) or 1
         state.update(repr((value.shape, value.dtype.str)).encode())
-        state.update(np.ascontiguousarray(flat[::step]).tobytes())
+        if flat.size <= _BLOCKS * _BLOCK_VALUES:
+            state.update(np.ascontiguousarray(flat).tobytes())
+        else:
+            for start in np.linspace(0, flat.size - _BLOCK_VALUES, _BLOCKS).astype(int):
+                state.update(np.ascontiguousarray(flat[start : start + _BLOCK_VALUES]).tobytes())
     elif is_dataclass(value):
         state.update(type(value).__name__.encode())
         for field in fields(value):
