@@ -1,7 +1,7 @@
 /* What a technique is: two functions over an index-space ray that starts at t = 0 inside a medium.
 
        bool sample_collision(scene, medium, ray, t_max, first, stream, tally, &collision)
-       float estimate_transmittance(scene, medium, ray, t_max, channel, stream, tally)
+       float estimate_transmittance(scene, medium, ray, t_max, channel, first, stream, tally)
 
    A technique header implements the first, a transmittance header the second; either walks the
    majorant's segments and reads density through volume_value().  `first` is the numbered dimension
