@@ -15,7 +15,7 @@ from clvol.cli_options import (
     Definition,
     ExplainedCommand,
     OneLineErrors,
-    choice_option,
+    choice_options,
     finite,
 )
 from clvol.errors import Error
@@ -32,6 +32,9 @@ Examples:
   clvol render scenes/cloud.xml -o cloud.exr -o cloud.png --spp 256
   clvol render scenes/cloud.xml -o cloud.exr --time 20 -v
   clvol render scenes/cloud.xml -o cloud.exr -D res=512 --majorant global
+  clvol render scenes/cloud.xml -o cloud.exr --technique decomposition --transmittance residual-ratio
+  clvol render scenes/fire.xml -o fire.exr --technique weighted-delta --majorant-scale 0.8
+  clvol render scenes/smoke.xml -o smoke.exr --aov cells --aov largest_weight
 """
 
 GROUP_EXAMPLES = """
@@ -79,11 +82,29 @@ def main(ctx: click.Context) -> None:
     required=True,
     help="Picture to write, .exr or .png; may be given several times.",
 )
-@choice_option("technique", "How collisions are sampled.")
-@choice_option("transmittance", "How transmittance is estimated.")
-@choice_option("majorant", "What bounds the extinction.")
-@choice_option("lookup", "How the density is looked up.")
-@choice_option("absorption", "How absorption is treated.")
+@choice_options
+@click.option(
+    "--majorant-scale",
+    type=click.FloatRange(min=0, min_open=True),
+    default=1.0,
+    callback=finite,
+    metavar="FACTOR",
+    help="Multiply every bound of the density, for experiments.",
+)
+@click.option(
+    "--step",
+    type=click.FloatRange(min=0, min_open=True),
+    callback=finite,
+    metavar="LENGTH",
+    help="Step of ray marching; the edge of a voxel by default.",
+)
+@click.option(
+    "--aov",
+    multiple=True,
+    metavar="NAME",
+    help="Add a picture of what walks count to the .exr: lookups, tentative, real, null, cells, violations, "
+    "largest_weight; may be given several times.",
+)
 @click.option("--spp", type=click.IntRange(min=1), help="Samples per pixel; the scene's own by default.")
 @click.option(
     "--time",

@@ -106,9 +106,15 @@ def finite(ctx: click.Context, param: click.Parameter, value: float | None) -> f
     return value
 
 
-def choice_option(family: str, text: str) -> Any:
-    """An option `--family` that takes a name of the registry's family; "auto" by default."""
-    return click.option(f"--{family}", type=RegistryChoice(family), default="auto", help=text)
+def choice_options(command: Any) -> Any:
+    """An option for every family of the registry that takes a name of it; "auto" by default."""
+    from clvol.registry import FAMILIES, FAMILY_PURPOSE
+
+    for family in reversed(FAMILIES):
+        text = FAMILY_PURPOSE[family]
+        option = click.option(f"--{family}", type=RegistryChoice(family), default="auto", help=text)
+        command = option(command)
+    return command
 
 
 class ExplainedCommand(click.Command):

@@ -21,25 +21,64 @@ class KernelConfig:
     majorant: str = "grid"  # "none" where no medium needs one
     lookup: str = "exact"
     absorption: str = "sample"
+    probability: str = "history"
+    control: str = "mean"
+    aov: tuple[str, ...] = ()
     local_size: int = 1
     group_slots: int = 256
+
+    @property
+    def tracker(self) -> registry.Choice:
+        """The technique's entry in the registry."""
+        return registry.TECHNIQUES[self.technique]
 
     @property
     def channels(self) -> int:
         """Channels of the image: 1 when every coefficient and light is grey, else 3."""
         f = self.features
-        return 3 if f.chromatic_extinction or f.chromatic_albedo or f.chromatic_light else 1
+        chromatic = f.chromatic_extinction or f.chromatic_albedo or f.chromatic_light or f.chromatic_emission
+        return 3 if chromatic else 1
 
     @property
     def one_channel_per_path(self) -> bool:
-        """Analog tracking of chromatic media follows one channel, chosen per path (METHODS §3, delta)."""
+        """A path follows one channel, chosen for it (METHODS §3, delta), where channels are attenuated or
+        absorbed differently and the technique cannot follow them together.  Homogeneous media can be, but for
+        overlaps, whose walks must not carry weights."""
         f = self.features
-        return f.chromatic_extinction or (f.chromatic_albedo and self.absorption == "sample")
+        if f.media_overlap or (f.heterogeneous and not self.tracker.all_channels):
+            return f.chromatic_extinction or (f.chromatic_albedo and self.absorption == "sample")
+        return False
 
     @property
     def spectrum(self) -> int:
         """Floats that a path's weight holds."""
         return 1 if self.one_channel_per_path else self.channels
+
+    @property
+    def extinction(self) -> int:
+        """Floats of a coefficient or transmittance: 3 where a path's channels are attenuated differently."""
+        return 3 if self.features.chromatic_extinction and not self.one_channel_per_path else 1
+
+    @property
+    def weighted(self) -> bool:
+        """Walks change the path's weight."""
+        return self.extinction == 3 or (self.features.heterogeneous and self.tracker.weighted)
+
+    @property
+    def walks_majorants(self) -> bool:
+        """Some stage walks majorant cells."""
+        shadows = self.nee and registry.TRANSMITTANCES[self.transmittance].walks_majorant
+        return self.majorant != "none" and (self.tracker.walks_majorant or shadows)
+
+    @property
+    def needs_controls(self) -> bool:
+        """The technique walks a control of each majorant cell."""
+        return self.majorant != "none" and self.tracker.control != "none"
+
+    @property
+    def needs_residuals(self) -> bool:
+        """Transmittance is estimated over a control of each majorant cell."""
+        return self.majorant != "none" and self.nee and self.transmittance == "residual-ratio"
 
     @property
     def first_weight(self) -> float:
@@ -76,6 +115,8 @@ class KernelConfig:
             "CLVOL_GROUP_SLOTS": self.group_slots,
             "CLVOL_CHANNELS": self.channels,
             "CLVOL_SPECTRUM": self.spectrum,
+            "CLVOL_EXTINCTION": self.extinction,
+            "CLVOL_WEIGHTED": int(self.weighted),
             "CLVOL_ONE_CHANNEL_PER_PATH": int(self.one_channel_per_path),
             "CLVOL_HAS_MEDIA": int(f.media > 0),
             "CLVOL_HAS_MANY_MEDIA": int(f.media > 1),
@@ -89,8 +130,15 @@ class KernelConfig:
             "CLVOL_HAS_NEAREST": int(f.nearest),
             "CLVOL_HAS_COLOURED_VOLUME": int(f.coloured_volumes),
             "CLVOL_HAS_ALBEDO_VOLUME": int(f.albedo_volumes),
+            "CLVOL_DENSITY_CHANNELS": 3 if f.coloured_extinction else 1,
+            "CLVOL_EMISSION_ON_WALKS": int(f.emission and not f.media_overlap),
+            "CLVOL_EMISSION_AT_COLLISIONS": int(f.emission and f.media_overlap),
+            "CLVOL_HAS_EMISSION_VOLUME": int(f.emission_volumes),
+            "CLVOL_HAS_TEMPERATURE": int(f.temperature),
             "CLVOL_HAS_ISOTROPIC": int(f.isotropic),
             "CLVOL_HAS_HG": int(f.hg),
+            "CLVOL_HAS_RAYLEIGH": int(f.rayleigh),
+            "CLVOL_HAS_BLEND": int(f.blend),
             "CLVOL_HAS_SCATTERING": int(f.scattering),
             "CLVOL_HAS_CONSTANT": int(f.constant),
             "CLVOL_HAS_ENVMAP": int(f.envmap),
@@ -102,4 +150,5 @@ class KernelConfig:
             "CLVOL_NEE": int(self.nee),
             "CLVOL_MIS": int(self.mis),
             "CLVOL_ABSORPTION": tuple(registry.ABSORPTIONS).index(self.absorption),
+            "CLVOL_PROBABILITY": tuple(registry.PROBABILITIES).index(self.probability),
         }

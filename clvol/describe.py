@@ -121,12 +121,28 @@ def _scene_lines(scene: records.Scene) -> Iterator[str]:
 def _medium(medium: records.Medium | None) -> str:
     if medium is None:
         return "empty"
-    phase = medium.phase.kind + (f" (g {_number(medium.phase.g)})" if medium.phase.kind == "hg" else "")
     return (
         f"{'homogeneous' if medium.homogeneous else 'heterogeneous'} medium: "
-        f"sigma_t {_volume(medium.sigma_t)} times {_number(medium.scale)}, "
-        f"albedo {_volume(medium.albedo)}, phase {phase}"
+        f"sigma_t {_volume(medium.sigma_t)} times {_spectrum(medium.scale)}, "
+        f"albedo {_volume(medium.albedo)}, phase {_phase(medium.phase)}{_emission(medium)}"
     )
+
+
+def _phase(phase: records.PhaseFunction) -> str:
+    if isinstance(phase, records.BlendPhase):
+        share = _number(phase.weight)
+        return f"blend ({_phase(phase.first)}, and {share} of it {_phase(phase.second)})"
+    return phase.kind + (f" (g {_number(phase.g)})" if phase.kind == "hg" else "")
+
+
+def _emission(medium: records.Medium) -> str:
+    factors = [f"emission {_volume(medium.emission)}"] if medium.emission else []
+    if medium.temperature:
+        offset, scale = _number(medium.temperature_offset), _number(medium.temperature_scale)
+        factors.append(f"a blackbody of ({_volume(medium.temperature)} - {offset}) times {scale} kelvin")
+    if not factors:
+        return ""
+    return f", emits {' times '.join(factors)} times {_number(medium.emission_scale)}"
 
 
 def _volume(volume: records.Volume) -> str:

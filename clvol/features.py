@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from clvol.scene import records
+from clvol.scene.phase import phase_lobes
 from clvol.volumes.grid import DenseGrid
 
 
@@ -32,9 +33,14 @@ class Features:
     clipped: bool = False
     media_overlap: bool = False
     chromatic_extinction: bool = False
+    coloured_extinction: bool = False
     chromatic_albedo: bool = False
     chromatic_light: bool = False
+    chromatic_emission: bool = False
     albedo_volumes: bool = False
+    emission: bool = False
+    emission_volumes: bool = False
+    temperature: bool = False
     trilinear: bool = False
     nearest: bool = False
     coloured_volumes: bool = False
@@ -42,6 +48,8 @@ class Features:
     spheres: bool = False
     isotropic: bool = False
     hg: bool = False
+    rayleigh: bool = False
+    blend: bool = False
     scattering: bool = False
     emitters: int = 0
     constant: bool = False
@@ -64,6 +72,9 @@ class Features:
         grey_light = all(_emitter_is_grey(e) for e in emitters)
         shapes = [s for s in scene.shapes if s.interior is not None]
         bounds = {bounding_kind(s) for s in shapes}
+        emissive = [m for m in media if m.emits]
+        lobes = [phase_lobes(m.phase) for m in media]
+        phases = {lobe.kind for mixture in lobes for lobe, _ in mixture}
         return cls(
             media=len(media),
             volumes=len(volumes),
@@ -71,17 +82,26 @@ class Features:
             heterogeneous=not all(homogeneous),
             clipped=any(is_clipped(m) for m in media),
             media_overlap=_may_overlap(shapes),
-            chromatic_extinction=any(not _is_grey(m.sigma_t) for m in media),
+            chromatic_extinction=any(not _is_grey(m.sigma_t) or len(set(m.scale)) > 1 for m in media),
+            coloured_extinction=any(
+                isinstance(m.sigma_t, records.GridVolume) and channels_of(m.sigma_t) > 1 for m in media
+            ),
             chromatic_albedo=any(not _is_grey(m.albedo) for m in media),
             chromatic_light=not grey_light,
+            chromatic_emission=any(m.temperature is not None or not _is_grey(m.emission) for m in emissive),
             albedo_volumes=any(isinstance(m.albedo, records.GridVolume) for m in media),
+            emission=bool(emissive),
+            emission_volumes=any(isinstance(m.emission, records.GridVolume) for m in emissive),
+            temperature=any(isinstance(m.temperature, records.GridVolume) for m in emissive),
             trilinear=any(v.filter_type == "trilinear" for v in volumes),
             nearest=any(v.filter_type == "nearest" for v in volumes),
             coloured_volumes=any(channels_of(v) > 1 for v in volumes),
             cubes="cube" in bounds,
             spheres="sphere" in bounds,
-            isotropic=any(m.phase.kind == "isotropic" for m in media),
-            hg=any(m.phase.kind == "hg" for m in media),
+            isotropic="isotropic" in phases,
+            hg="hg" in phases,
+            rayleigh="rayleigh" in phases,
+            blend=any(len(mixture) > 1 for mixture in lobes),
             scattering=any(_scatters(m) for m in media),
             emitters=len(emitters),
             constant=records.ConstantEmitter in kinds,
@@ -107,8 +127,9 @@ def scene_media(scene: records.Scene) -> list[records.Medium]:
 
 
 def medium_volumes(medium: records.Medium) -> list[records.GridVolume]:
-    """Grid volumes of a medium: sigma_t first, then albedo."""
-    return [v for v in (medium.sigma_t, medium.albedo) if isinstance(v, records.GridVolume)]
+    """Grid volumes of a medium: sigma_t, albedo and, where it emits, emission and temperature."""
+    emission = (medium.emission, medium.temperature) if medium.emits else ()
+    return [v for v in (medium.sigma_t, medium.albedo, *emission) if isinstance(v, records.GridVolume)]
 
 
 def is_homogeneous(medium: records.Medium) -> bool:
@@ -141,7 +162,8 @@ def bounding_kind(shape: records.Shape) -> str:
 
 
 def _scatters(medium: records.Medium) -> bool:
-    return not isinstance(medium.albedo, records.ConstVolume) or any(a > 0 for a in medium.albedo.value)
+    albedo = medium.albedo.value if isinstance(medium.albedo, records.ConstVolume) else (1.0,)
+    return bool((np.array(albedo) * np.array(medium.scale) > 0).any())
 
 
 def _emitter_is_grey(emitter: records.Emitter) -> bool:

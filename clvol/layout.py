@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from clvol import registry
+from clvol.blackbody import BINS, MIDDLE_KELVIN
 from clvol.config import KernelConfig
 
 _C_TYPES = {"f": "float", "i": "int", "u": "uint"}
@@ -42,17 +43,30 @@ MEDIUM = _record(
     ("box_lower", "f", 3),
     ("box_upper", "f", 3),
     ("sigma_t", "f", 3),  # homogeneous: the coefficient; heterogeneous: multiplies the volume
+    ("march_step", "f", 1),  # world length of a step of ray marching
     ("albedo", "f", 3),  # used where albedo_volume < 0
     ("sigma_t_volume", "i", 1),
     ("albedo_volume", "i", 1),
-    ("phase_kind", "i", 1),  # PHASE_ISOTROPIC, PHASE_HG
-    ("phase_g", "f", 1),
+    ("phase_first", "i", 1),  # first entry in `phases`
+    ("phase_count", "i", 1),
     ("sample_emitters", "i", 1),
-    ("majorant", "f", 1),  # global bound of sigma_t
+    ("emits", "i", 1),
+    ("emission", "f", 3),  # multiplies emission_volume and the blackbody, where there are any
+    ("emission_volume", "i", 1),
+    ("temperature_volume", "i", 1),
+    ("temperature_scale", "f", 1),
+    ("temperature_offset", "f", 1),
+    ("majorant", "f", 1),  # global bound of the volume; sigma_t multiplies it
     ("cells", "i", 3),  # majorant cells per axis
-    ("cell_offset", "i", 1),  # first entry in `majorants`
+    ("cell_offset", "i", 1),  # first row in `majorants`, `controls` and `residuals`
     ("cell_size", "f", 1),  # edge of a majorant cell in index units
     ("kd_root", "i", 1),  # first entry in `kd_nodes`
+)
+
+PHASE = _record(
+    ("kind", "i", 1),  # PHASE_ISOTROPIC, PHASE_HG, PHASE_RAYLEIGH
+    ("g", "f", 1),
+    ("weight", "f", 1),  # share of the medium's phase function; within a medium, the smallest first
 )
 
 EMITTER = _record(
@@ -97,6 +111,7 @@ RENDER = _record(
 RECORDS = {
     "Volume": VOLUME,
     "Medium": MEDIUM,
+    "Phase": PHASE,
     "Emitter": EMITTER,
     "Envmap": ENVMAP,
     "Render": RENDER,
@@ -104,11 +119,12 @@ RECORDS = {
 
 ENUMS = {
     "SHAPE": ("NONE", "CUBE", "SPHERE"),
-    "PHASE": ("ISOTROPIC", "HG"),
+    "PHASE": ("ISOTROPIC", "HG", "RAYLEIGH"),
     "EMITTER": ("CONSTANT", "ENVMAP", "DIRECTIONAL", "POINT"),
     "QUEUE": ("GENERATE", "INTERSECT", "MEDIUM", "SHADE", "SHADOW"),
     "EVENT": ("ESCAPE", "COLLISION"),
     "ABSORPTION": tuple(registry.ABSORPTIONS),
+    "PROBABILITY": tuple(registry.PROBABILITIES),
     "CONTROL": ("NEXT_JOB", "JOB_LIMIT", "NON_FINITE", "DONE"),  # DONE: one counter per pass in the ring
 }
 COUNTER_STRIDE = 16  # queue counters of a group, padded to a cache line
@@ -147,7 +163,16 @@ def path_fields(config: KernelConfig) -> list[PathField]:
         PathField("job", "u", "where in `results` the path ends up; NO_JOB: the slot is empty"),
         PathField("bounce", "u", "scatterings so far"),
         PathField("event", "u", "what shade has to handle: EVENT_*"),
-        PathField("lookups", "u", "density look-ups so far"),
+        *(
+            PathField(name, "u", f"{meaning}, of the path (if a picture shows them) or the slot", needed)
+            for name, meaning, needed in (
+                ("lookups", "density look-ups", True),
+                ("tentative", "tentative collisions", features.media > 0),
+                ("real", "real collisions", features.media > 0),
+                ("cells", "majorant cells crossed", features.heterogeneous),
+                ("violations", "look-ups above their majorant", features.heterogeneous),
+            )
+        ),
         PathField("channel", "u", "the one channel this path follows", config.one_channel_per_path),
         PathField("pdf", "f", "density of the last direction; 0 where MIS does not apply", config.mis),
         PathField("medium", "i", "medium of the current interval", features.media > 1),
@@ -165,12 +190,9 @@ def path_fields(config: KernelConfig) -> list[PathField]:
             PathField(f"shadow_{c}", "f", "unattenuated light of next-event estimation", config.nee)
             for c in spectrum
         ),
-        PathField(
-            "violations", "u", "statistics of the slot: look-ups above their majorant", features.heterogeneous
-        ),
         PathField("cut", "u", "statistics of the slot: paths ended by max_depth", features.depth_limited),
         PathField("cut_energy", "f", "statistics of the slot: weight of those paths", features.depth_limited),
-        PathField("largest_weight", "f", "statistics of the slot: largest path weight", features.scattering),
+        PathField("largest_weight", "f", "largest weight of the path or the slot", features.media > 0),
         PathField(
             "exhausted", "u", "statistics of the slot: walks ended by the loop bound", features.heterogeneous
         ),
@@ -179,13 +201,34 @@ def path_fields(config: KernelConfig) -> list[PathField]:
 
 
 SLOT_STATISTICS = {
+    "tentative": np.sum,
+    "real": np.sum,
+    "cells": np.sum,
     "violations": np.sum,
     "cut": np.sum,
     "cut_energy": np.sum,
     "largest_weight": np.max,
     "exhausted": np.sum,
 }
-"""Fields that a slot keeps from path to path, and how those of all slots combine."""
+"""Fields that a slot keeps from path to path, unless a picture shows them, and how those of slots combine."""
+
+
+def path_counts(config: KernelConfig) -> tuple[str, ...]:
+    """Counts that are kept per path and summed per pixel: look-ups, and what `config.aov` shows."""
+    shown = {"lookups", *config.aov} | ({"tentative", "real"} if "null" in config.aov else set())
+    kept = {field.name for field in path_fields(config)}
+    return tuple(name for name in registry.COUNTS if name in shown and name in kept)
+
+
+def shows_weight(config: KernelConfig) -> bool:
+    """Whether the largest weight is kept per path: `config.aov` shows it."""
+    return "largest_weight" in config.aov and config.features.media > 0
+
+
+def slot_fields(config: KernelConfig) -> list[str]:
+    """Statistics that slots keep for themselves."""
+    per_path = {*path_counts(config), *(("largest_weight",) if shows_weight(config) else ())}
+    return [f.name for f in path_fields(config) if f.name in SLOT_STATISTICS and f.name not in per_path]
 
 
 @dataclass(frozen=True)
@@ -212,13 +255,19 @@ def arguments(config: KernelConfig) -> list[Argument]:
         Argument("counts", "__global uint *"),
         Argument("control", "__global uint *"),
         Argument("results", "__global float *"),
-        Argument("result_lookups", "__global uint *"),
+        Argument("result_counts", "__global uint *"),
         Argument("media", "__global const Medium *", features.media > 0),
         Argument("volumes", "__global const Volume *", features.volumes > 0),
         Argument("tops", "__global const int *", features.volumes > 0),
         Argument("bricks", "__global const float *", features.volumes > 0),
-        Argument("majorants", "__global const float *", config.majorant == "grid"),
-        Argument("kd_nodes", "__global const uint2 *", config.majorant == "kdtree"),
+        Argument("majorants", "__global const float *", config.walks_majorants and config.majorant == "grid"),
+        Argument(
+            "kd_nodes", "__global const uint2 *", config.walks_majorants and config.majorant == "kdtree"
+        ),
+        Argument("controls", "__global const float *", config.needs_controls),
+        Argument("residuals", "__global const float *", config.needs_residuals),
+        Argument("blackbody", "__global const float *", features.temperature),
+        Argument("phases", "__global const Phase *", features.scattering),
         Argument("emitters", "__global const Emitter *", features.emitters > 0),
         Argument("envmap", "__global const Envmap *", features.envmap),
         Argument("env_texels", "__global const float *", features.envmap),
@@ -261,4 +310,31 @@ def layout_text(config: KernelConfig) -> str:
             f"INLINE {c_type} path_{field.name}({slot}) {{ return {get}; }}",
             f"INLINE void set_path_{field.name}({slot}, {c_type} value) {{ {at} = {put}; }}",
         ]
+    parts += _counts_text(config)
     return "\n".join(parts) + "\n"
+
+
+def _counts_text(config: KernelConfig) -> list[str]:
+    """How a path's counts are begun and written; its largest weight, if it is kept, comes last."""
+    counts, weight = path_counts(config), shows_weight(config)
+    stride = len(counts) + weight
+    reset = [f"set_path_{name}(scene, slot, 0);" for name in counts]
+    write = [
+        f"scene->result_counts[place * CLVOL_RESULT_COUNTS + {n}u] = path_{name}(scene, slot);"
+        for n, name in enumerate(counts)
+    ]
+    if weight:
+        reset.append(f"set_path_largest_weight(scene, slot, {config.first_weight}f);")
+        write.append(
+            f"scene->result_counts[place * CLVOL_RESULT_COUNTS + {len(counts)}u]"
+            " = as_uint(path_largest_weight(scene, slot));"
+        )
+    return [
+        f"#define CLVOL_PATH_COUNTS {len(counts)}u",
+        f"#define CLVOL_RESULT_COUNTS {stride}u",
+        f"#define CLVOL_PEAKS {1 + weight}",
+        f"#define BLACKBODY_BINS {BINS}",
+        f"#define BLACKBODY_MIDDLE {MIDDLE_KELVIN}f",
+        "INLINE void reset_counts(const Scene *scene, uint slot) { " + " ".join(reset) + " }",
+        "INLINE void write_counts(const Scene *scene, uint slot, size_t place) { " + " ".join(write) + " }",
+    ]

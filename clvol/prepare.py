@@ -4,19 +4,30 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from clvol.accel import choice
+from clvol.accel import choice, controls
 from clvol.accel.bounds import Bounds, with_slack
-from clvol.accel.kdtree import KdTree, build_kdtree, tree_lattice
+from clvol.accel.kdtree import KdTree, build_kdtree, pack_maximum, tree_lattice, unpack_maximum
 from clvol.errors import SceneError
-from clvol.features import Features, is_clipped, is_homogeneous, scene_media, shape_bounds
+from clvol.features import (
+    Features,
+    is_clipped,
+    is_homogeneous,
+    medium_volumes,
+    scene_media,
+    shape_bounds,
+)
 from clvol.scene import records
 from clvol.volumes.bricks import BOUND_CELLS, BrickMap, build_bricks
 from clvol.volumes.grid import DenseGrid
 
 log = logging.getLogger("clvol")
+
+COVERED = ("albedo", "emission", "temperature")
+"""Volumes of a medium that are looked up wherever sigma_t is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,33 +39,83 @@ class PreparedVolume:
     world_to_index: np.ndarray
 
 
+@dataclass(frozen=True)
+class MajorantNeeds:
+    """What tracking needs to know of each majorant cell.
+
+    majorant : "global", "grid", "kdtree", or "auto" for the one of least expected cost.
+    control : "none", "min" or "fitted", what the technique's decomposition subtracts.
+    residual : "none", "mean", "min" or "max", the control of residual ratio tracking.
+    scale : multiplies every bound, for experiments.
+    """
+
+    majorant: str = "auto"
+    control: str = "none"
+    residual: str = "none"
+    scale: float = 1.0
+
+    @property
+    def means(self) -> bool:
+        """Whether the means of cells are wanted, which takes another pass over the volume."""
+        return self.control == "fitted" or self.residual == "mean"
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedMajorant:
+    """The cells of one medium's majorant, in the units of its sigma_t volume.
+
+    A row is the whole medium for `global`, a cell in C order [z, y, x] for `grid`, and a leaf for `kdtree`.
+
+    cells, cell_size : the lattice it is walked on, x y z, and a cell's edge in index units.
+    nodes : uint32 (m, 2), the kd-tree, its bounds as in `majorant`; else None.
+    majorant : float32 (n,), bound of all channels, times `MajorantNeeds.scale`.
+    control : float32 (n, channels), what decomposition subtracts; None where nothing is.
+    residual : float32 (n, channels + 1), control and majorant of residual ratio tracking; None where unused.
+    """
+
+    cells: tuple[int, int, int]
+    cell_size: float
+    nodes: np.ndarray | None
+    majorant: np.ndarray
+    control: np.ndarray | None
+    residual: np.ndarray | None
+
+
 @dataclass(frozen=True, eq=False)
 class PreparedScene:
-    """Everything about a scene that can be worked out without a device."""
+    """Everything about a scene that can be worked out without a device.
+
+    majorant : the chosen kind, "none" where no medium is heterogeneous.
+    volumes, majorants : by id() of the GridVolume and of the Medium, which the scene keeps alive.
+    """
 
     scene: records.Scene
     features: Features
     centre: np.ndarray
     radius: float
-    volumes: dict[int, PreparedVolume]  # by id() of the GridVolume, which the scene keeps alive
+    volumes: dict[int, PreparedVolume]
+    needs: MajorantNeeds
     majorant: str
-    bounds: dict[int, Bounds]  # by id() of the Medium
-    trees: dict[int, KdTree]
+    majorants: dict[int, PreparedMajorant]
 
 
-def prepare(scene: records.Scene, majorant: str = "auto") -> PreparedScene:
-    """Build brick maps and majorants; `auto` takes the majorant of least expected cost."""
+def prepare(scene: records.Scene, needs: MajorantNeeds | None = None) -> PreparedScene:
+    """Build brick maps, majorants and what `needs` asks of them.
+
+    Raises SceneError where a coefficient is too large for a float, or a volume is wrapped as none can be.
+    """
+    needs = needs or MajorantNeeds()
     features = Features.from_scene(scene)
     centre, radius = _scene_sphere(scene)
     volumes = {}
     for medium in scene_media(scene):
-        for volume in (medium.sigma_t, medium.albedo):
-            if isinstance(volume, records.GridVolume) and id(volume) not in volumes:
+        for volume in medium_volumes(medium):
+            if id(volume) not in volumes:
                 volumes[id(volume)] = _prepare_volume(volume, centre)
-        _check_albedo_cover(medium)
+        _check_cover(medium)
     media = [m for m in scene_media(scene) if not is_homogeneous(m)]
-    majorant, bounds, trees = _choose_majorants(media, volumes, majorant)
-    return PreparedScene(scene, features, centre, radius, volumes, majorant, bounds, trees)
+    majorant, majorants = _choose_majorants(media, volumes, needs)
+    return PreparedScene(scene, features, centre, radius, volumes, needs, majorant, majorants)
 
 
 def _scene_sphere(scene: records.Scene) -> tuple[np.ndarray, float]:
@@ -79,62 +140,110 @@ def _prepare_volume(volume: records.GridVolume, centre: np.ndarray) -> PreparedV
     return PreparedVolume(volume, bricks, to_brick @ np.linalg.inv(to_world))
 
 
-def _check_albedo_cover(medium: records.Medium) -> None:
-    """Beyond its box a repeated or mirrored albedo would need its wrap mode on the device."""
-    albedo = medium.albedo
-    if not isinstance(albedo, records.GridVolume) or albedo.wrap_mode == "clamp":
-        return
+def _check_cover(medium: records.Medium) -> None:
+    """Beyond its box a repeated or mirrored volume would need its wrap mode on the device."""
     sigma_t = medium.sigma_t
-    same = isinstance(sigma_t, records.GridVolume) and is_clipped(medium)
-    same = same and np.allclose(sigma_t.index_to_world @ _box(sigma_t), albedo.index_to_world @ _box(albedo))
-    if not same:
-        raise SceneError(
-            f"wrap_mode {albedo.wrap_mode!r} of an albedo volume that does not share the box of sigma_t",
-            albedo.source or medium.name,
-            "give both volumes the same to_world, or use wrap_mode clamp",
+    for volume in medium_volumes(medium):
+        if volume is sigma_t or volume.wrap_mode == "clamp":
+            continue
+        same = isinstance(sigma_t, records.GridVolume) and is_clipped(medium)
+        same = same and np.allclose(
+            sigma_t.index_to_world @ _box(sigma_t), volume.index_to_world @ _box(volume)
         )
+        if not same:
+            name = next(name for name in COVERED if getattr(medium, name) is volume)
+            raise SceneError(
+                f"wrap_mode {volume.wrap_mode!r} of the {name} volume, whose box is not that of sigma_t",
+                volume.source or medium.name,
+                "give both volumes the same to_world, or use wrap_mode clamp",
+            )
 
 
 def _box(volume: records.GridVolume) -> np.ndarray:
     return np.array([[*volume.lower, 1.0], [*volume.upper, 1.0]]).T
 
 
+class _Candidate(NamedTuple):
+    """One medium's majorant of one kind: the lattice it is walked on, its tree, its expected cost."""
+
+    bounds: Bounds
+    tree: KdTree | None
+    cost: float
+
+
 def _choose_majorants(
-    media: list[records.Medium], volumes: dict[int, PreparedVolume], majorant: str
-) -> tuple[str, dict[int, Bounds], dict[int, KdTree]]:
-    """Bounds and trees per medium for one kind of majorant, the cheapest on the whole for `auto`."""
+    media: list[records.Medium], volumes: dict[int, PreparedVolume], needs: MajorantNeeds
+) -> tuple[str, dict[int, PreparedMajorant]]:
+    """Majorants per medium of one kind, the cheapest on the whole for `auto`, and the kind's name."""
     if not media:
-        return "none", {}, {}
-    names = ("global", "grid", "kdtree") if majorant == "auto" else (majorant,)
-    found = {name: [_majorant(m, volumes[id(m.sigma_t)], name) for m in media] for name in names}
-    costs = {name: sum(cost for _, _, cost in found[name]) for name in names}
+        return "none", {}
+    for medium in media:
+        _check_range(medium, volumes[id(medium.sigma_t)], needs)
+    names = ("global", "grid", "kdtree") if needs.majorant == "auto" else (needs.majorant,)
+    bounds = {key: _bounds(volumes[key], needs) for key in {id(m.sigma_t) for m in media}}
+    found = {
+        name: [_candidate(m, volumes[id(m.sigma_t)], bounds[id(m.sigma_t)], name, needs) for m in media]
+        for name in names
+    }
+    costs = {name: sum(candidate.cost for candidate in found[name]) for name in names}
     chosen = min(costs, key=costs.get)
-    if majorant == "auto":
+    if needs.majorant == "auto":
         least = costs[chosen] or 1.0
         relative = ", ".join(f"{name} {cost / least:.2f}" for name, cost in costs.items())
         log.info("majorant %s: expected cost per ray relative to it: %s", chosen, relative)
-    bounds = {id(m): b for m, (b, _, _) in zip(media, found[chosen], strict=True)}
-    trees = {id(m): tree for m, (_, tree, _) in zip(media, found[chosen], strict=True) if tree}
-    return chosen, bounds, trees
+    return chosen, {id(m): _tables(c, chosen, needs) for m, c in zip(media, found[chosen], strict=True)}
 
 
-def _majorant(
-    medium: records.Medium, volume: PreparedVolume, kind: str
-) -> tuple[Bounds, KdTree | None, float]:
-    """One medium's majorant of one kind: the lattice it is walked on, its tree, its expected cost."""
-    if float(volume.bricks.maximum.max()) * medium.scale > float(np.finfo(np.float32).max):
+def _check_range(medium: records.Medium, volume: PreparedVolume, needs: MajorantNeeds) -> None:
+    scale = float(np.max(medium.scale))
+    largest = float(volume.bricks.maximum.max())
+    if largest * max(scale, 1.0) * max(needs.scale, 1.0) > float(np.finfo(np.float32).max):
+        factor = "" if needs.scale == 1 else f" and majorant_scale {needs.scale:g}"
         raise SceneError(
-            f"sigma_t times scale {medium.scale:g} is too large for a float",
+            f"sigma_t times scale {scale:g}{factor} is too large for a float",
             volume.volume.source or medium.name,
         )
-    bounds = with_slack(volume.bricks.minimum, volume.bricks.maximum, BOUND_CELLS)
+
+
+def _bounds(volume: PreparedVolume, needs: MajorantNeeds) -> Bounds:
+    """Bounds over the finest cells there are, with means where they are wanted."""
+    bricks = volume.bricks
+    return with_slack(bricks.minimum, bricks.maximum, BOUND_CELLS, bricks.means() if needs.means else None)
+
+
+def _candidate(
+    medium: records.Medium, volume: PreparedVolume, bounds: Bounds, kind: str, needs: MajorantNeeds
+) -> _Candidate:
     extent = np.linalg.norm(np.linalg.inv(volume.world_to_index)[:3, :3], axis=0)
+    rate, technique = float(np.max(medium.scale)), (needs.control, needs.scale)
     if kind == "kdtree":
         bounds = tree_lattice(bounds)
-        cell = extent * bounds.cell_size
-        tree = build_kdtree(bounds, cell, medium.scale, choice.LEAF_COST, choice.STEP_COST)
-        return bounds, tree, tree.cost
+        visits = choice.LEAF_COST, choice.STEP_COST
+        tree = build_kdtree(bounds, extent * bounds.cell_size, rate, *visits, *technique)
+        return _Candidate(bounds, tree, tree.cost)
     if kind == "grid":
-        bounds, cost = choice.best_grid(bounds, extent * bounds.cell_size, medium.scale)
-        return bounds, None, cost
-    return bounds, None, choice.global_cost(bounds, extent * bounds.cell_size, medium.scale)
+        bounds, cost = choice.best_grid(bounds, extent * bounds.cell_size, rate, *technique)
+        return _Candidate(bounds, None, cost)
+    return _Candidate(bounds, None, choice.global_cost(bounds, extent * bounds.cell_size, rate, *technique))
+
+
+def _tables(candidate: _Candidate, kind: str, needs: MajorantNeeds) -> PreparedMajorant:
+    """What the device reads of a majorant's cells, row by row."""
+    bounds, tree, _ = candidate
+    found = tree or (bounds.whole() if kind == "global" else bounds)
+    channels = found.maximum.shape[-1]
+    extrema = [
+        None if values is None else values.reshape(-1, channels)
+        for values in (found.minimum, found.maximum, found.mean)
+    ]
+    majorant = controls.scaled_majorant(extrema[1], needs.scale)
+    if tree:
+        majorant = unpack_maximum(pack_maximum(majorant))
+    control = residual = None
+    if needs.control != "none":
+        control = controls.control(*extrema, needs.control, needs.scale)
+    if needs.residual != "none":
+        chosen, residual_majorant = controls.residual(*extrema, needs.residual, needs.scale)
+        residual = np.column_stack([chosen, residual_majorant])
+    nodes = tree.nodes if tree else None
+    return PreparedMajorant(bounds.cells, bounds.cell_size, nodes, majorant, control, residual)

@@ -48,21 +48,34 @@ def _expand(name: str, seen: set[str]) -> Iterator[str]:
             yield line
 
 
-def _headers(config: KernelConfig, stage: str) -> list[str]:
+def stage_headers(config: KernelConfig, stage: str) -> list[str]:
     """Headers that a stage of this configuration needs, in order."""
     features = config.features
     walks = stage in ("medium_sample", "shadow_transmittance")
-    reads_volumes = (walks and features.heterogeneous) or (stage == "shade" and features.albedo_volumes)
+    emits = (stage == "medium_sample" and features.emission and not features.media_overlap) or (
+        stage == "shade" and features.emission and features.media_overlap
+    )
+    scatters = stage == "shade" and features.scattering
+    fields = (emits and (features.albedo_volumes or features.emission_volumes or features.temperature)) or (
+        scatters and features.albedo_volumes
+    )
     headers = []
-    if reads_volumes:
-        headers.append("density/volume.h")
-    headers.append("tracking/interface.h")
     if walks and features.heterogeneous:
-        headers.append(registry.MAJORANTS[config.majorant].header)
-        family = registry.TECHNIQUES[config.technique] if stage == "medium_sample" else None
-        headers.append((family or registry.TRANSMITTANCES[config.transmittance]).header)
+        headers.append(registry.LOOKUPS[config.lookup].header)
+    elif fields:
+        headers.append("density/volume.h")
+    if emits:
+        headers.append("medium/emission.h")
+    elif scatters:
+        headers.append("medium/albedo.h")
+    if walks and features.heterogeneous:
+        chosen = config.tracker if stage == "medium_sample" else registry.TRANSMITTANCES[config.transmittance]
+        if chosen.walks_majorant:
+            headers.append(registry.MAJORANTS[config.majorant].header)
+        headers.append(chosen.header)
     if walks and features.homogeneous:
-        headers.append("tracking/homogeneous.h")
+        analytic = "homogeneous" if stage == "medium_sample" else "homogeneous_transmittance"
+        headers.append(f"tracking/{analytic}.h")
     if stage == "shade":
         if features.scattering:
             headers.append("phase/phase.h")
@@ -98,7 +111,7 @@ def compose(config: KernelConfig, headers: list[str], body: str) -> str:
 
 def stage_source(config: KernelConfig, stage: str) -> str:
     """The composed source of one stage kernel, or of `accumulate`."""
-    headers = [] if stage == "accumulate" else [*_headers(config, stage), "stages/path.h"]
+    headers = [] if stage == "accumulate" else [*stage_headers(config, stage), "stages/path.h"]
     return compose(config, headers, f'#include "kernels/{stage}.cl"\n')
 
 

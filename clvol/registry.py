@@ -14,20 +14,99 @@ from clvol.errors import OptionError
 
 @dataclass(frozen=True)
 class Choice:
-    """One legal value: `summary` for the user, `header` under cl/ where it has one."""
+    """One legal value: `summary` for the user, `header` under cl/ where it has one, and what else it needs.
+
+    all_channels : a path follows every channel at once; else one, where channels are attenuated differently.
+    weighted : its walks change the path's weight.
+    needs_bound : it is right only where the majorant bounds sigma_t, so that majorant_scale < 1 is refused.
+    control : what each majorant cell must carry beside its bound: "min" of the density, or "fitted".
+    walks_majorant : it walks majorant cells at all.
+    linear : it uses the density of a look-up once and linearly, so that a stochastic look-up may replace it.
+    biased : its pictures are labelled as biased.
+    """
 
     summary: str
     header: str = ""
+    all_channels: bool = False
+    weighted: bool = False
+    needs_bound: bool = False
+    control: str = "none"
+    walks_majorant: bool = True
+    linear: bool = True
+    biased: bool = False
 
 
 TECHNIQUES = {
     "delta": Choice(
-        "Woodcock tracking: exact free flights by rejection against the majorant", "tracking/delta.h"
+        "Woodcock tracking: exact free flights by rejection against the majorant",
+        "tracking/delta.h",
+        needs_bound=True,
+    ),
+    "weighted-delta": Choice(
+        "delta tracking with weights: right for any majorant", "tracking/weighted.h", weighted=True
+    ),
+    "decomposition": Choice(
+        "a constant control in each majorant cell, found without look-ups, and delta tracking of the rest",
+        "tracking/decomposition.h",
+        needs_bound=True,
+        control="min",
+    ),
+    "weighted-decomposition": Choice(
+        "decomposition with weights: controls a little above the least density, right for any majorant",
+        "tracking/weighted_decomposition.h",
+        weighted=True,
+        control="fitted",
+    ),
+    "spectral": Choice(
+        "weighted delta tracking of all channels at once",
+        "tracking/weighted.h",
+        all_channels=True,
+        weighted=True,
+    ),
+    "spectral-decomposition": Choice(
+        "weighted decomposition of all channels at once",
+        "tracking/weighted_decomposition.h",
+        all_channels=True,
+        weighted=True,
+        control="fitted",
+    ),
+    "regular": Choice(
+        "exact flights, by inverting the optical depth voxel by voxel; all channels at once",
+        "tracking/regular.h",
+        all_channels=True,
+        linear=False,
+    ),
+    "marching": Choice(
+        "BIASED baseline: fixed steps (--step) of constant density",
+        "tracking/marching.h",
+        walks_majorant=False,
+        linear=False,
+        biased=True,
     ),
 }
 TRANSMITTANCES = {
+    "delta": Choice("all or nothing, by delta tracking", "tracking/delta_transmittance.h", needs_bound=True),
     "ratio": Choice("ratio tracking: product of null-collision probabilities", "tracking/ratio.h"),
-    "none": Choice("no next-event estimation: environments are found by scattering alone"),
+    "residual-ratio": Choice(
+        "exact transmittance of a control in each majorant cell (--control), ratio tracking of the rest",
+        "tracking/residual_ratio.h",
+    ),
+    "regular": Choice(
+        "exact, voxel by voxel, without variance", "tracking/regular_transmittance.h", linear=False
+    ),
+    "power-series": Choice(
+        "power series of exp, its factors from combs of look-ups", "tracking/power_series.h"
+    ),
+    "marching": Choice(
+        "BIASED baseline: fixed steps (--step) of constant density",
+        "tracking/marching_transmittance.h",
+        walks_majorant=False,
+        linear=False,
+        biased=True,
+    ),
+    "none": Choice(
+        "no next-event estimation: environments are found by scattering alone", walks_majorant=False
+    ),
 }
 MAJORANTS = {
     "global": Choice("one bound for the whole medium", "majorant/global.h"),
@@ -35,12 +114,25 @@ MAJORANTS = {
     "kdtree": Choice("a bound per leaf of an adaptive tree", "majorant/kdtree.h"),
 }
 LOOKUPS = {
-    "exact": Choice("the volume's own filter: trilinear or nearest"),
+    "exact": Choice("the volume's own filter: trilinear or nearest", "density/exact.h"),
+    "stochastic": Choice(
+        "one sample drawn by the trilinear weights instead of eight", "density/stochastic.h"
+    ),
 }
 ABSORPTIONS = {
     "sample": Choice("a collision absorbs the path with probability sigma_a / sigma_t"),
     "weight": Choice("a collision multiplies the path's weight by the albedo"),
     "mixed": Choice("by weight while the path's weight is above 1/2, sampled below"),
+}
+PROBABILITIES = {
+    "history": Choice("events in proportion to the mean of weight times coefficient: weights stay bounded"),
+    "average": Choice("events in proportion to the mean coefficient of the channels"),
+    "max": Choice("events in proportion to the largest coefficient of the channels"),
+}
+CONTROLS = {
+    "mean": Choice("the mean density of each majorant cell"),
+    "min": Choice("the least density of each majorant cell"),
+    "max": Choice("the greatest density of each majorant cell"),
 }
 
 FAMILIES = {
@@ -49,7 +141,28 @@ FAMILIES = {
     "majorant": MAJORANTS,
     "lookup": LOOKUPS,
     "absorption": ABSORPTIONS,
+    "probability": PROBABILITIES,
+    "control": CONTROLS,
 }
+FAMILY_PURPOSE = {
+    "technique": "How collisions are sampled.",
+    "transmittance": "How transmittance is estimated.",
+    "majorant": "What bounds the extinction.",
+    "lookup": "How the density is looked up.",
+    "absorption": "How absorption is treated.",
+    "probability": "How a spectral technique chooses events.",
+    "control": "What residual-ratio subtracts.",
+}
+
+COUNTS = {
+    "lookups": "density look-ups",
+    "tentative": "tentative collisions",
+    "real": "real collisions",
+    "cells": "majorant cells crossed",
+    "violations": "look-ups above their majorant",
+}
+"""What walks count, per path."""
+AOVS = COUNTS | {"null": "null collisions", "largest_weight": "largest absolute path weight"}
 
 
 def check_choice(family: str, value: str) -> str:

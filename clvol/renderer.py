@@ -6,13 +6,13 @@ import operator
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 
 from clvol import registry
+from clvol.choices import Choices, prepare_for
 from clvol.device import open_device
 from clvol.errors import OptionError
-from clvol.prepare import prepare
 from clvol.progress import ProgressCallback, RichProgress
 from clvol.result import Result
 from clvol.scene.records import Scene
@@ -29,6 +29,11 @@ def render(
     majorant: str = "auto",
     lookup: str = "auto",
     absorption: str = "auto",
+    probability: str = "auto",
+    control: str = "auto",
+    majorant_scale: float = 1.0,
+    step: float | None = None,
+    aov: Sequence[str] = (),
     time_limit: float | None = None,
     device: str | None = None,
     progress: bool | ProgressCallback = False,
@@ -41,8 +46,13 @@ def render(
     ----------
     scene : from `load_file` or `load_dict`.
     spp, seed : samples per pixel and 64-bit seed; default to the scene's.
-    technique, transmittance, majorant, lookup, absorption : names from `clvol.registry`; "auto" takes the
-        scene's own choice, else follows fixed rules, so that the same seed gives the same bits.
+    technique, transmittance, majorant, lookup, absorption, probability, control : names from
+        `clvol.registry`; "auto" takes the scene's own choice, else follows fixed rules, so that the same seed
+        gives the same bits.
+    majorant_scale : multiplies every bound of the density, for experiments; below 1 only for techniques and
+        transmittances that stay unbiased there.
+    step : world length of a step of ray marching; the edge of a voxel by default.
+    aov : names from `registry.AOVS` to add to `result.aovs`, means per path ("largest_weight": the maximum).
     time_limit : seconds after which no new pass of samples is begun; alone it replaces `spp`.
     device : index or part of the name of an OpenCL device (see `clvol devices`).
     progress : True for a progress bar, or a callable that receives `clvol.progress.Progress` records.
@@ -62,24 +72,27 @@ def render(
         raise OptionError(
             f"render takes a Scene, not {type(scene).__name__}", hint="make one with load_file or load_dict"
         )
-    chosen = {
+    asked = {
         "technique": technique,
         "transmittance": transmittance,
         "majorant": majorant,
         "lookup": lookup,
         "absorption": absorption,
+        "probability": probability,
+        "control": control,
     }
-    choices = {family: _choice(scene, family, value) for family, value in chosen.items()}
+    names = {family: _choice(scene, family, value) for family, value in asked.items()}
+    choices = Choices(**names, majorant_scale=majorant_scale, step=step, aov=aov)
     first, count = _sample_range(scene, spp, time_limit, samples)
     seed = scene.seed if seed is None else seed
     if not 0 <= seed < 2**64:
         raise OptionError(f"seed {seed} is not a 64-bit number", hint="choose one from 0 to 2**64 - 1")
     started = time.perf_counter()
     opened = open_device(device)
-    prepared = prepare(scene, choices["majorant"])
+    prepared = prepare_for(scene, choices)
     session = Session.open(opened, prepared, choices, seed, pool)
     session.describe()
-    session.warn_of_unused(chosen)
+    session.warn_of_unused(asked)
     setup_seconds = time.perf_counter() - started
     bar = RichProgress() if progress is True else nullcontext(progress or None)
     with bar as callback, _interrupt_flag() as interrupted:

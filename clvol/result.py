@@ -158,7 +158,8 @@ def merge(results: Iterable[Result]) -> Result:
     """Combine results of disjoint sample ranges of one render into the result of all samples.
 
     Sums and counts add up; AOVs are means weighted by the samples; statistics add, but for maxima and
-    sizes (names that begin with "largest", "peak", "bytes", "slots", "pool"), of which the largest stays.
+    sizes (names that begin with "largest", "peak", "bytes", "slots", "pool"), of which the largest stays, and
+    for means per path ("energy…"), which are weighted by the paths.
 
     Raises
     ------
@@ -178,7 +179,7 @@ def merge(results: Iterable[Result]) -> Result:
         sum_=np.sum([result.sum_ for result in results], axis=0),
         sum_of_squares=np.sum([result.sum_of_squares for result in results], axis=0),
         samples=(ranges[0][0], sum(counts)),
-        aovs={name: _weighted_mean(name, results, counts) for name in results[0].aovs},
+        aovs={name: _merged_aov(name, results, counts) for name in results[0].aovs},
         stats=_merged_stats([result.stats for result in results]),
         metadata=_merged_metadata([result.metadata for result in results], sum(counts)),
     )
@@ -219,8 +220,10 @@ def _joined(spans: Sequence[tuple[int, int]]) -> Ranges:
     return tuple(joined)
 
 
-def _weighted_mean(name: str, results: Sequence[Result], counts: Sequence[int]) -> np.ndarray:
-    """Mean of one AOV weighted by the number of samples, float32."""
+def _merged_aov(name: str, results: Sequence[Result], counts: Sequence[int]) -> np.ndarray:
+    """Mean of one AOV weighted by the number of samples, or its maximum where the name says so; float32."""
+    if name.startswith(_LARGEST):
+        return np.max([result.aovs[name] for result in results], axis=0)
     total = sum(
         result.aovs[name].astype(np.float64) * count for result, count in zip(results, counts, strict=True)
     )
@@ -230,7 +233,11 @@ def _weighted_mean(name: str, results: Sequence[Result], counts: Sequence[int]) 
 def _merged_stats(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Merge dictionaries of statistics, nested ones too; a name only some of them have is kept."""
     names = dict.fromkeys(name for part in parts for name in part)
-    return {name: _merged_stat(name, [part[name] for part in parts if name in part]) for name in names}
+    merged = {name: _merged_stat(name, [part[name] for part in parts if name in part]) for name in names}
+    for name in names:
+        if name.startswith("energy") and merged.get("paths"):
+            merged[name] = sum(part.get(name, 0.0) * part["paths"] for part in parts) / merged["paths"]
+    return merged
 
 
 def _merged_stat(name: str, values: Sequence[Any]) -> Any:

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clvol import layout
+from clvol import layout, registry
 from clvol.camera import camera_rays
+from clvol.choices import Choices, resolve
 from clvol.config import KernelConfig
 from clvol.device import Device
-from clvol.errors import OptionError
 from clvol.film import FILTER_BINS
 from clvol.prepare import PreparedScene
 from clvol.programs import build_stages
@@ -40,19 +40,20 @@ class Session:
     config: KernelConfig
     wavefront: Wavefront
     seed: int
+    step: float | None = None
 
     @classmethod
     def open(
-        cls, device: Device, prepared: PreparedScene, choices: dict[str, str], seed: int, pool: int | None
+        cls, device: Device, prepared: PreparedScene, choices: Choices, seed: int, pool: int | None = None
     ) -> Session:
         """Compose and build the kernels, upload the scene, allocate the pool."""
         config = kernel_config(prepared, choices, device)
         kernels = build_stages(device, config)
-        buffers = upload_scene(device, prepared, config)
+        buffers = upload_scene(device, prepared, config, choices.step)
         record = render_record(prepared, seed)
         wavefront = Wavefront(device, config, kernels, buffers, record, Pool.for_device(device, config, pool))
         wavefront.warm_up()
-        return cls(device, prepared, config, wavefront, seed)
+        return cls(device, prepared, config, wavefront, seed, choices.step)
 
     def describe(self) -> None:
         """Log what was found and built."""
@@ -78,27 +79,42 @@ class Session:
         used = self.choices()
         for family, value in asked.items():
             if value not in ("auto", used[family]):
-                log.warning(
-                    "%s %s is not used: the scene's media need %s",
-                    family,
-                    value,
-                    "none" if used[family] == "none" else f"only the {used[family]} rule",
-                )
-        if not self.config.features.emitters:
+                reason = f"the scene's media need only the {used[family]} rule"
+                if used[family] == "none":
+                    reason = f"nothing in this render needs a {family}"
+                log.warning("%s %s is not used: %s", family, value, reason)
+        if self.prepared.needs.scale != 1 and used["majorant"] == "none":
+            log.warning("majorant_scale is not used: nothing in this render walks a majorant")
+        if not self.config.features.emitters and not self.config.features.emission:
             log.warning("the scene has no emitter: its picture is black")
+        for what in self.biased():
+            log.warning("%s is BIASED: the picture's mean is off by an unknown amount", what)
 
     def choices(self) -> dict[str, str]:
         """The choices in force; "none" where the scene has no use for one."""
         config, features = self.config, self.config.features
         walks = features.heterogeneous
         analytic = "analytic" if features.homogeneous else "none"
+        chooses = config.spectrum == 3 and (config.extinction == 3 or config.absorption == "sample")
         return {
             "technique": config.technique if walks else analytic,
             "transmittance": (config.transmittance if walks else analytic) if config.nee else "none",
-            "majorant": config.majorant,
-            "lookup": config.lookup if walks else "none",
-            "absorption": config.absorption if features.media else "none",
+            "majorant": config.majorant if config.walks_majorants else "none",
+            "lookup": config.lookup
+            if walks and not (features.nearest and not features.trilinear)
+            else "none",
+            "absorption": config.absorption if features.media and features.scattering else "none",
+            "probability": config.probability if walks and config.weighted and chooses else "none",
+            "control": config.control if config.needs_residuals else "none",
         }
+
+    def biased(self) -> list[str]:
+        """The choices in force whose pictures are biased, as "family name"."""
+        used = self.choices()
+        families = {"technique": registry.TECHNIQUES, "transmittance": registry.TRANSMITTANCES}
+        return [
+            f"{f} {used[f]}" for f, table in families.items() if used[f] in table and table[used[f]].biased
+        ]
 
     def run(
         self,
@@ -135,37 +151,64 @@ class Session:
         film = self.prepared.scene.film
         shape = (film.height, film.width)
         sums = [np.broadcast_to(s, (len(s), 3)).reshape(*shape, 3).copy() for s in self.wavefront.sums()]
-        lookups = self.wavefront.lookups()
-        stats = self._statistics(count, lookups, setup_seconds)
+        stats = self._statistics(count, setup_seconds)
         metadata = {
             "scene": self.prepared.scene.source,
             "digest": scene_digest(self.prepared.scene),
             **self.choices(),
+            **({"majorant_scale": self.prepared.needs.scale} if self.prepared.needs.scale != 1 else {}),
+            **({"biased": ", ".join(self.biased()), "step": self.step or "voxel"} if self.biased() else {}),
             "spp": count,
             "seed": self.seed,
             "device": self.device.description,
             "version": __version__,
             "seconds": round(self.seconds, 4),
         }
-        aovs = {"lookups": (lookups.astype(np.float64) / count).astype(np.float32).reshape(shape)}
+        aovs = {name: values.reshape(shape) for name, values in self._pictures(count).items()}
         return Result.from_sums(*sums, (first, count), aovs, stats, metadata)
 
-    def _statistics(self, count: int, lookups: np.ndarray, setup_seconds: float) -> dict:
+    def _pictures(self, count: int) -> dict[str, np.ndarray]:
+        """Look-ups and what `aov` asks for: means per path, and the largest weight; float32 (pixels,)."""
+        pixels = self.wavefront.pixels
+        counts = {n: (c.astype(np.float64) / count) for n, c in self.wavefront.counts().items()}
+        peaks = self.wavefront.peaks_by_pixel()
+        found = {}
+        for name in dict.fromkeys(("lookups", *self.config.aov)):
+            if name == "largest_weight":
+                values = peaks.get(name, np.full(pixels, self.config.first_weight))
+            elif name == "null":
+                values = counts["tentative"] - counts["real"] if "tentative" in counts else np.zeros(pixels)
+            else:
+                values = counts.get(name, np.zeros(pixels))
+            found[name] = values.astype(np.float32)
+        return found
+
+    def _statistics(self, count: int, setup_seconds: float) -> dict:
         wavefront = self.wavefront
         slots = wavefront.slot_statistics()
+        peaks = {n: float(p.max(initial=0.0)) for n, p in wavefront.peaks_by_pixel().items()}
+        counts = {n: int(slots.get(n, 0)) for n in registry.COUNTS}
+        counts |= {n: int(c.sum()) for n, c in wavefront.counts().items()}
         paths = count * wavefront.pixels
         stats = {
             "paths": paths,
-            "lookups": int(lookups.sum()),
+            "lookups": counts["lookups"],
+            "tentative_collisions": counts["tentative"],
+            "null_collisions": counts["tentative"] - counts["real"],
+            "real_collisions": counts["real"],
+            "cells_crossed": counts["cells"],
             "seconds": {"setup": setup_seconds, "render": self.seconds, **wavefront.seconds},
             "launches": wavefront.launches,
             "waves": wavefront.waves,
             "slots": wavefront.pool.slots,
             "bytes_per_slot": 4 * len(wavefront.fields),
             "non_finite": wavefront.non_finite(),
-            "majorant_violations": int(slots.get("violations", 0)),
+            "majorant_violations": counts["violations"],
             "walks_exhausted": int(slots.get("exhausted", 0)),
-            "largest_weight": max(self.config.first_weight, slots.get("largest_weight", 0.0)),
+            "largest_weight": max(
+                self.config.first_weight, slots.get("largest_weight", 0.0), peaks.get("largest_weight", 0.0)
+            ),
+            "largest_sample": peaks["largest_sample"],
             "paths_cut_by_max_depth": int(slots.get("cut", 0)),
             "energy_lost_to_caps": slots.get("cut_energy", 0.0) / paths,
         }
@@ -184,23 +227,13 @@ class Session:
         return stats
 
 
-def kernel_config(prepared: PreparedScene, choices: dict[str, str], device: Device) -> KernelConfig:
-    """Resolve `auto` by fixed rules and tune the launch for the kind of device."""
-    features = prepared.features
-    fixed = {"technique": "delta", "transmittance": "ratio", "lookup": "exact", "absorption": "mixed"}
-    if not (features.envmap or features.directional or features.point_lights):
-        # scattering finds a constant environment as well as sampling it does, without the shadow ray
-        fixed["transmittance"] = "none"
-    resolved = {k: choices[k] if choices[k] != "auto" else v for k, v in fixed.items()}
-    if resolved["transmittance"] == "none" and (features.directional or features.point_lights):
-        raise OptionError(
-            "transmittance 'none' cannot render point and directional lights",
-            hint="only next-event estimation reaches them: use ratio",
-        )
+def kernel_config(prepared: PreparedScene, choices: Choices, device: Device) -> KernelConfig:
+    """What is compiled: `auto` resolved by fixed rules, the launch tuned for the kind of device."""
+    resolved = resolve(prepared.features, choices.names)
     tuning = (
         {"local_size": 1, "group_slots": 256} if device.is_cpu else {"local_size": 128, "group_slots": 1024}
     )
-    return KernelConfig(features, majorant=prepared.majorant, **resolved, **tuning)
+    return KernelConfig(prepared.features, majorant=prepared.majorant, aov=choices.aov, **resolved, **tuning)
 
 
 def render_record(prepared: PreparedScene, seed: int) -> np.ndarray:

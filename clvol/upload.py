@@ -6,25 +6,29 @@ Volumes are written brick chunk by brick chunk, so that the host never holds a s
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 import pyopencl as cl
 
 from clvol import layout
-from clvol.accel.kdtree import pack_maximum
+from clvol.blackbody import blackbody_rgb, blackbody_table
 from clvol.config import KernelConfig
 from clvol.device import Device
 from clvol.environment import envmap_distribution, luminance
 from clvol.features import bounding_kind, is_clipped, is_homogeneous, scene_media
 from clvol.film import filter_cdf
-from clvol.prepare import PreparedScene
+from clvol.prepare import PreparedScene, PreparedVolume
 from clvol.scene import records
+from clvol.scene.phase import phase_lobes
 from clvol.volumes.bricks import BRICK_SAMPLES
 
 
-def upload_scene(device: Device, prepared: PreparedScene, config: KernelConfig) -> dict[str, cl.Buffer]:
-    """Buffers of every scene argument that `config` needs, by argument name."""
+def upload_scene(
+    device: Device, prepared: PreparedScene, config: KernelConfig, step: float | None = None
+) -> dict[str, cl.Buffer]:
+    """Buffers of every scene argument that `config` needs, by argument name.
+
+    `step` is the world length of a step of ray marching; None takes the least edge of a voxel.
+    """
     volumes = {key: number for number, key in enumerate(prepared.volumes)}
     emitters = emitter_order(prepared.scene)
     buffers: dict[str, cl.Buffer] = {}
@@ -32,13 +36,27 @@ def upload_scene(device: Device, prepared: PreparedScene, config: KernelConfig) 
     if "volumes" in needed:
         buffers |= _volume_buffers(device, prepared)
     if "media" in needed:
-        buffers["media"] = _buffer(device, _media(prepared, volumes))
+        buffers["media"] = _buffer(device, _media(prepared, volumes, step))
+    majorants = [
+        prepared.majorants[id(m)] for m in scene_media(prepared.scene) if id(m) in prepared.majorants
+    ]
     if "majorants" in needed:
-        grids = [b.maximum * np.float32(m.scale) for m, b in _heterogeneous(prepared)]
-        buffers["majorants"] = _buffer(device, np.concatenate([g.reshape(-1) for g in grids]))
+        buffers["majorants"] = _buffer(device, np.concatenate([m.majorant for m in majorants]))
     if "kd_nodes" in needed:
-        trees = [_scaled_nodes(prepared.trees[id(m)].nodes, m.scale) for m, _ in _heterogeneous(prepared)]
-        buffers["kd_nodes"] = _buffer(device, np.concatenate(trees))
+        buffers["kd_nodes"] = _buffer(device, np.concatenate([m.nodes for m in majorants]))
+    if "controls" in needed:
+        buffers["controls"] = _table(device, [m.control for m in majorants])
+    if "residuals" in needed:
+        channels = max(m.residual.shape[1] - 1 for m in majorants)
+        rows = [
+            np.hstack([np.broadcast_to(m.residual[:, :-1], (len(m.residual), channels)), m.residual[:, -1:]])
+            for m in majorants
+        ]
+        buffers["residuals"] = _table(device, rows)
+    if "blackbody" in needed:
+        buffers["blackbody"] = _buffer(device, blackbody_table())
+    if "phases" in needed:
+        buffers["phases"] = _buffer(device, _phases(scene_media(prepared.scene)))
     if "emitters" in needed:
         buffers["emitters"] = _buffer(device, _emitters(prepared, emitters))
     if "envmap" in needed:
@@ -62,22 +80,11 @@ def _rgb(value: tuple[float, ...]) -> np.ndarray:
     return np.broadcast_to(np.asarray(value, np.float64), 3)
 
 
-def _heterogeneous(prepared: PreparedScene) -> Iterable:
-    """(medium, bounds) of the media that have a volume, in the order of the records."""
-    return [(m, prepared.bounds[id(m)]) for m in scene_media(prepared.scene) if not is_homogeneous(m)]
-
-
-def _scaled_nodes(nodes: np.ndarray, scale: float) -> np.ndarray:
-    """kd nodes with their leaves' extrema in coefficients; scaled up and down so that they stay bounds."""
-    nodes = nodes.copy()
-    leaf = (nodes[:, 0] & 3) == 3
-    empty = leaf & (nodes[:, 0] == 3)
-    high = nodes[leaf, 0].view(np.float32) * np.float32(scale)
-    high[empty[leaf]] = 0
-    nodes[leaf, 0] = pack_maximum(high)
-    low = nodes[leaf, 1].view(np.float32) * np.float32(scale)
-    nodes[leaf, 1] = np.nextafter(low, np.float32(0)).view(np.uint32)
-    return nodes
+def _table(device: Device, parts: list[np.ndarray]) -> cl.Buffer:
+    """Rows per majorant cell of every medium, one after the other; a grey medium repeats its channel."""
+    width = max(part.shape[1] for part in parts)
+    rows = [np.broadcast_to(part, (len(part), width)) for part in parts]
+    return _buffer(device, np.concatenate(rows).astype(np.float32))
 
 
 def _volume_buffers(device: Device, prepared: PreparedScene) -> dict[str, cl.Buffer]:
@@ -107,41 +114,71 @@ def _volume_buffers(device: Device, prepared: PreparedScene) -> dict[str, cl.Buf
     return {"volumes": _buffer(device, table), "tops": _buffer(device, np.concatenate(tops)), "bricks": pool}
 
 
-def _media(prepared: PreparedScene, volumes: dict[int, int]) -> np.ndarray:
+def _media(prepared: PreparedScene, volumes: dict[int, int], step: float | None) -> np.ndarray:
     """One Medium record per bounding shape."""
     shapes = [s for s in prepared.scene.shapes if s.interior is not None]
     table = np.zeros(len(shapes), layout.MEDIUM)
-    cell_offset = kd_root = 0
+    cell_offset = kd_root = phase_first = 0
     for record, shape in zip(table, shapes, strict=True):
         medium = shape.interior
         record["shape_from_world"] = rows_3x4(_from_centred(shape.to_world, prepared.centre))
         record["shape_kind"] = layout.enum("SHAPE", bounding_kind(shape))
         record["homogeneous"] = int(is_homogeneous(medium))
         record["clipped"] = int(is_clipped(medium))
-        record["phase_kind"] = layout.enum("PHASE", medium.phase.kind)
-        record["phase_g"] = medium.phase.g
+        record["phase_first"], record["phase_count"] = phase_first, len(phase_lobes(medium.phase))
+        phase_first += record["phase_count"]
         record["sample_emitters"] = int(medium.sample_emitters)
+        _emission(record, medium, volumes)
         record["sigma_t_volume"] = volumes.get(id(medium.sigma_t), -1)
         record["albedo_volume"] = volumes.get(id(medium.albedo), -1)
         if isinstance(medium.albedo, records.ConstVolume):
             record["albedo"] = _rgb(medium.albedo.value)
         if is_homogeneous(medium):
-            record["sigma_t"] = _rgb(medium.sigma_t.value) * medium.scale
+            record["sigma_t"] = _rgb(medium.sigma_t.value) * _rgb(medium.scale)
             record["box_from_world"] = rows_3x4(_from_centred(medium.sigma_t.to_world, prepared.centre))
             record["box_upper"] = 1.0
             continue
-        bounds, volume = prepared.bounds[id(medium)], prepared.volumes[id(medium.sigma_t)]
+        majorant, volume = prepared.majorants[id(medium)], prepared.volumes[id(medium.sigma_t)]
         to_brick = volume.world_to_index @ _centred(medium.sigma_t.index_to_world, prepared.centre)
-        record["sigma_t"] = medium.scale
+        record["sigma_t"] = _rgb(medium.scale)
         record["box_from_world"] = rows_3x4(volume.world_to_index)
         record["box_lower"] = (to_brick @ [*medium.sigma_t.lower, 1.0])[:3]
         record["box_upper"] = (to_brick @ [*medium.sigma_t.upper, 1.0])[:3]
-        record["majorant"] = np.float32(bounds.maximum.max()) * np.float32(medium.scale)
-        record["cells"], record["cell_size"] = bounds.cells, bounds.cell_size
+        record["march_step"] = step or voxel_edges(volume).min()
+        record["majorant"] = majorant.majorant.max()
+        record["cells"], record["cell_size"] = majorant.cells, majorant.cell_size
         record["cell_offset"], record["kd_root"] = cell_offset, kd_root
-        cell_offset += bounds.maximum.size
-        kd_root += len(prepared.trees[id(medium)].nodes) if id(medium) in prepared.trees else 0
+        cell_offset += len(majorant.majorant)
+        kd_root += 0 if majorant.nodes is None else len(majorant.nodes)
     return table
+
+
+def _phases(media: list[records.Medium]) -> np.ndarray:
+    """One Phase record per lobe of each medium, in the order that `phase_first` counts in."""
+    lobes = [(layout.enum("PHASE", p.kind), p.g, share) for m in media for p, share in phase_lobes(m.phase)]
+    return np.array(lobes, layout.PHASE)
+
+
+def voxel_edges(volume: PreparedVolume) -> np.ndarray:
+    """World lengths of a voxel's edges, float64 (3,)."""
+    return np.linalg.norm(np.linalg.inv(volume.world_to_index)[:3, :3], axis=0)
+
+
+def _emission(record: np.void, medium: records.Medium, volumes: dict[int, int]) -> None:
+    """What a medium emits; constants are multiplied together here."""
+    record["emission_volume"] = volumes.get(id(medium.emission), -1)
+    record["temperature_volume"] = volumes.get(id(medium.temperature), -1)
+    if not medium.emits:
+        return
+    radiance = np.full(3, medium.emission_scale)
+    if isinstance(medium.emission, records.ConstVolume):
+        radiance = radiance * _rgb(medium.emission.value)
+    if isinstance(medium.temperature, records.ConstVolume):
+        kelvin = (medium.temperature.value[0] - medium.temperature_offset) * medium.temperature_scale
+        radiance = radiance * blackbody_rgb(np.array([kelvin]))[0]
+    record["emits"], record["emission"] = 1, radiance
+    record["temperature_scale"] = medium.temperature_scale
+    record["temperature_offset"] = medium.temperature_offset
 
 
 def _centred(to_world: np.ndarray, centre: np.ndarray) -> np.ndarray:

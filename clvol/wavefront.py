@@ -23,6 +23,8 @@ from clvol.errors import OptionError
 NO_JOB = 0xFFFFFFFF
 _NEXT_JOB, _JOB_LIMIT, _NON_FINITE, _DONE = (layout.enum("CONTROL", n) for n in layout.ENUMS["CONTROL"])
 _MAX_ROUND_JOBS = 1 << 31
+_HARVEST_SECONDS = 2.0
+"""Statistics of the slots are collected at least this often: their 32-bit counters must not run over."""
 _BATCH_SECONDS = 0.02
 """Waves are launched in batches of about this length; between batches the host reads the counters."""
 
@@ -80,6 +82,10 @@ class Wavefront:
         self.pass_samples = max(1, pool.pass_jobs // self.pixels)
         self.groups = pool.slots // config.group_slots
         self.fields = layout.path_fields(config)
+        self.path_counts = layout.path_counts(config)
+        self.peaks = 1 + layout.shows_weight(config)
+        self.slot_totals = dict.fromkeys(layout.slot_fields(config), 0.0)
+        self._harvested = time.perf_counter()
         self.stride = pool.slots + 16  # off the power of two, or all fields of a slot share a cache set
         self.seconds = dict.fromkeys((*config.stages, "accumulate"), 0.0)
         self.launches = self.waves = 0
@@ -94,14 +100,18 @@ class Wavefront:
             "counts": 4 * layout.COUNTER_STRIDE * self.groups,
             "control": 4 * (_DONE + self.pool.ring_passes),
             "results": 4 * self.config.channels * ring_jobs,
-            "result_lookups": 4 * ring_jobs,
+            "result_counts": 4 * (len(self.path_counts) + self.peaks - 1) * ring_jobs,
         }
         self.buffers = {name: self._buffer(size) for name, size in sizes.items()} | scene_buffers
         self.bytes = sum(sizes.values()) + sum(b.size for b in scene_buffers.values())
-        film_bytes = 16 * self.config.channels * self.pixels
-        self.film_buffer, self.film_lookups = self._buffer(film_bytes), self._buffer(8 * self.pixels)
-        for buffer, size in ((self.film_buffer, film_bytes), (self.film_lookups, 8 * self.pixels)):
-            cl.enqueue_fill_buffer(self.device.queue, buffer, np.uint32(0), 0, size)
+        film_sizes = {
+            "film": 16 * self.config.channels * self.pixels,
+            "film_counts": 8 * len(self.path_counts) * self.pixels,
+            "film_peaks": 4 * self.peaks * self.pixels,
+        }
+        self.film = {name: self._buffer(size) for name, size in film_sizes.items()}
+        for name, size in film_sizes.items():
+            cl.enqueue_fill_buffer(self.device.queue, self.film[name], np.uint32(0), 0, size)
         state = np.zeros((len(self.fields), self.stride), np.uint32)
         state[[f.name for f in self.fields].index("job")] = NO_JOB
         self._write("state", state)
@@ -167,6 +177,8 @@ class Wavefront:
             self._write("control", np.array([limit], np.uint32), 4 * _JOB_LIMIT)
             elapsed = self._launch(waves)
             waves = int(np.clip(waves * _BATCH_SECONDS / max(elapsed, 1e-6), 1, max(2 * waves, 4)))
+            if time.perf_counter() - self._harvested > _HARVEST_SECONDS:
+                self._harvest()
             control = self._read_control()
             begun = min(allowed, -(-int(control[_NEXT_JOB]) // pass_jobs))
             while finished < begun:
@@ -226,15 +238,14 @@ class Wavefront:
 
     def _accumulate(self, ring_pass: int, samples: int) -> None:
         """Add one finished pass to the film and free its place in the ring."""
-        names = ("results", "result_lookups")
         local = 64
         event = self.kernels["accumulate"](
             self.device.queue,
             (-(-self.pixels // local) * local,),
             (local,),
-            *(self.buffers[name] for name in names),
-            self.film_buffer,
-            self.film_lookups,
+            self.buffers["results"],
+            self.buffers["result_counts"],
+            *self.film.values(),
             self.buffers["control"],
             np.uint32(ring_pass),
             np.uint32(self.pass_samples * self.pixels),
@@ -246,29 +257,46 @@ class Wavefront:
         self.seconds["accumulate"] += 1e-9 * (event.profile.end - event.profile.start)
         self._write("control", np.zeros(1, np.uint32), 4 * (_DONE + ring_pass))
 
+    def _film(self, name: str, shape: tuple[int, ...], dtype: type) -> np.ndarray:
+        array = np.empty(shape, dtype)
+        cl.enqueue_copy(self.device.queue, array, self.film[name], is_blocking=True)
+        return array
+
     def sums(self) -> tuple[np.ndarray, np.ndarray]:
         """Sums of the samples and of their squares so far, float64 (pixels, channels)."""
-        film = np.empty((self.pixels, self.config.channels, 4), np.float32)
-        cl.enqueue_copy(self.device.queue, film, self.film_buffer, is_blocking=True)
-        film = film.astype(np.float64)
+        film = self._film("film", (self.pixels, self.config.channels, 4), np.float32).astype(np.float64)
         return film[..., 0] + film[..., 1], film[..., 2] + film[..., 3]
 
-    def lookups(self) -> np.ndarray:
-        """Density look-ups so far, uint64 (pixels,)."""
-        lookups = np.empty(self.pixels, np.uint64)
-        cl.enqueue_copy(self.device.queue, lookups, self.film_lookups, is_blocking=True)
-        return lookups
+    def counts(self) -> dict[str, np.ndarray]:
+        """What walks counted so far, by name, uint64 (pixels,)."""
+        counts = self._film("film_counts", (self.pixels, len(self.path_counts)), np.uint64)
+        return {name: counts[:, n] for n, name in enumerate(self.path_counts)}
+
+    def peaks_by_pixel(self) -> dict[str, np.ndarray]:
+        """Largest absolute sample of each pixel, and weight where a picture shows it; float32 (pixels,)."""
+        peaks = self._film("film_peaks", (self.pixels, self.peaks), np.float32)
+        return {
+            name: peaks[:, n] for n, name in enumerate(("largest_sample", "largest_weight")[: self.peaks])
+        }
 
     def slot_statistics(self) -> dict[str, float]:
         """Statistics that slots keep for themselves, combined over the slots."""
-        state = np.empty((len(self.fields), self.stride), np.uint32)
-        cl.enqueue_copy(self.device.queue, state, self.buffers["state"], is_blocking=True)
-        totals = {}
-        for field, row in zip(self.fields, state[:, : self.pool.slots], strict=True):
-            if field.name in layout.SLOT_STATISTICS:
-                values = row.view(np.float32) if field.kind == "f" else row
-                totals[field.name] = layout.SLOT_STATISTICS[field.name](values.astype(np.float64)).item()
-        return totals
+        self._harvest()
+        return dict(self.slot_totals)
+
+    def _harvest(self) -> None:
+        """Collect what the slots have counted since the last time, and let them begin anew."""
+        rows = {f.name: n for n, f in enumerate(self.fields)}
+        zeros = np.zeros(self.stride, np.uint32)
+        for name in self.slot_totals:
+            field, row = self.fields[rows[name]], np.empty(self.stride, np.uint32)
+            at = 4 * self.stride * rows[name]
+            cl.enqueue_copy(self.device.queue, row, self.buffers["state"], src_offset=at, is_blocking=True)
+            self._write("state", zeros, at)
+            found = (row.view(np.float32) if field.kind == "f" else row)[: self.pool.slots].astype(np.float64)
+            combine = layout.SLOT_STATISTICS[name]
+            self.slot_totals[name] = combine([self.slot_totals[name], combine(found)]).item()
+        self._harvested = time.perf_counter()
 
     def non_finite(self) -> int:
         """Samples that were NaN or infinite."""

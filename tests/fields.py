@@ -29,6 +29,23 @@ def vacuum():
 FIELDS = {"constant": constant, "ramp": ramp, "sparse": sparse, "vacuum": vacuum}
 
 
+def tinted():
+    """Lumps over a base, the same in every channel: colour comes from the medium's scale alone."""
+    rng = np.random.default_rng(11)
+    return (0.3 + 0.7 * rng.random((11, 12, 13)) ** 4).astype(np.float32)
+
+
+def coloured():
+    """Channels of different shape: dense lumps; half as dense, mirrored; a ramp a thousand times thinner."""
+    lumps = sparse((16, 17, 18)) + np.float32(0.02)
+    ramp = np.broadcast_to(np.linspace(0.2, 1.0, 18, dtype=np.float32), lumps.shape)
+    return np.stack([lumps, 0.5 * lumps[::-1, :, ::-1], 1e-3 * ramp], axis=-1)
+
+
+CHROMATIC = {"tinted": (tinted, (6.0, 3.0, 1.0)), "coloured": (coloured, (40.0,))}
+"""Fields of three channels and their medium's scale: 60:30:10 by scale, and 1000:1 by the grid itself."""
+
+
 def trilinear(values, points):
     """Cell-centred trilinear interpolation in the unit cube, clamped; points (n, 3) as x, y, z, float64."""
     size = np.array(values.shape[::-1])

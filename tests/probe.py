@@ -3,9 +3,9 @@
 import numpy as np
 import pyopencl as cl
 
-from clvol import layout, programs, registry
+from clvol import layout, programs
+from clvol.choices import Choices, prepare_for
 from clvol.config import KernelConfig
-from clvol.prepare import prepare
 from clvol.scene.records import (
     ConstantEmitter,
     ConstVolume,
@@ -71,10 +71,15 @@ class Probe:
 
     def __init__(self, device, scene, **choices):
         self.device = device
-        self.prepared = prepare(scene, choices.get("majorant", "grid"))
-        resolved = {family: choices.get(family, "auto") for family in registry.FAMILIES}
-        self.config: KernelConfig = kernel_config(self.prepared, resolved, device)
-        self.buffers = upload_scene(device, self.prepared, self.config)
+        self.choices = Choices(**({"majorant": "grid"} | choices))
+        self.prepared = prepare_for(scene, self.choices)
+        self.config: KernelConfig = kernel_config(self.prepared, self.choices, device)
+        self.upload()
+
+    def upload(self):
+        """Write the prepared scene to the device (again)."""
+        device = self.device
+        self.buffers = upload_scene(device, self.prepared, self.config, self.choices.step)
         self.buffers["render"] = cl.Buffer(
             device.context,
             cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR,
@@ -90,7 +95,7 @@ class Probe:
         extra = "".join(f", __global {c_types[a.dtype.kind]} *{name}" for name, a in names)
         source = programs.compose(
             self.config,
-            ["tracking/interface.h", *headers],
+            [*headers],
             f"__kernel void probe(CLVOL_ARGUMENTS{extra}, uint count)\n{{\n"
             "    const Scene scene_ = CLVOL_SCENE;\n    const Scene *scene = &scene_;\n"
             f"    const uint i = get_global_id(0);\n    if (i >= count)\n        return;\n{body}\n}}\n",

@@ -16,6 +16,8 @@ from clvol import render
 from clvol.accel.bounds import with_slack
 from clvol.scene.records import ConstantEmitter, DirectionalEmitter
 
+pytestmark = pytest.mark.xdist_group("agreement")  # pictures are shared between its tests
+
 CUBE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 SKY = (ConstantEmitter((0.6,)),)
 TRAVEL = tuple(unit((0.5, -1.0, 0.4)))
@@ -112,8 +114,10 @@ def test_a_bias_of_one_tile_is_rejected():
 
 @pytest.mark.parametrize("majorant", ["global", "grid", "kdtree"])
 def test_a_majorant_ten_percent_too_low_is_caught_by_count_and_by_picture(majorant, monkeypatch):
-    def lowered(minimum, maximum, cell_size):
-        bounds = with_slack(minimum, maximum, cell_size)
+    reference()  # before anything is broken
+
+    def lowered(minimum, maximum, cell_size, mean=None):
+        bounds = with_slack(minimum, maximum, cell_size, mean)
         return replace(bounds, maximum=bounds.maximum * np.float32(0.9))
 
     monkeypatch.setattr("clvol.prepare.with_slack", lowered)

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from probe import Probe, grid_volume, medium_of, scene_of
+from trees import leaves_of
 
 from clvol.accel.bounds import with_slack
 from clvol.accel.kdtree import build_kdtree, pack_maximum
@@ -54,8 +55,9 @@ def test_every_trilinear_value_lies_within_the_bounds_of_its_cell(values):
     bounds = bounds_of(values)
     while True:
         cells = cells_of(points, bounds)
-        assert (found <= bounds.maximum[cells]).all()
-        assert (found >= bounds.minimum[cells]).all()
+        assert (found <= bounds.majorant[cells]).all()
+        assert (found <= bounds.maximum[cells][:, 0]).all()
+        assert (found >= bounds.minimum[cells][:, 0]).all()
         if max(bounds.cells) == 1:
             return
         bounds = bounds.coarser()
@@ -69,19 +71,20 @@ def test_every_trilinear_value_lies_within_the_bounds_of_its_leaf(values, rate, 
     bounds = bounds_of(values)
     tree = build_kdtree(bounds, np.array([1.0, 0.7, 1.3]), rate, visit_cost, 0.2 * visit_cost)
     for point, value in zip(points, found, strict=True):
-        low, high = leaf_of(tree.nodes, point, bounds)
-        assert low <= value <= high
+        leaf, high = leaf_of(tree.nodes, point, bounds)
+        assert value <= high
+        assert tree.minimum[leaf, 0] <= value <= tree.maximum[leaf, 0]
 
 
 def leaf_of(nodes, point, bounds):
-    """Bounds of the leaf that holds an index position, found as the device finds it."""
+    """Number and packed maximum of the leaf that holds an index position, found as the device finds it."""
     cell = np.clip((point // bounds.cell_size).astype(int), 0, np.array(bounds.cells) - 1)
     node = nodes[0]
     while node[0] & 3 != 3:
         right = cell[node[0] & 3] >= node[0] >> 2
         node = nodes[int(node[1]) + int(right)]
     high = 0.0 if node[0] == 3 else node[:1].view(np.float32)[0]
-    return node[1:].view(np.float32)[0], high
+    return int(node[1]), high
 
 
 def test_without_the_halo_the_bounds_fail():
@@ -117,20 +120,12 @@ def test_constant_volumes_get_one_leaf_and_lumpy_ones_more():
 
 def expected_cost(nodes, bounds, rate, leaf_cost, step_cost):
     """Cost of a tree by walking it: what its builder minimised."""
-    total, stack = 0.0, [(0, np.zeros(3, int), np.array(bounds.cells), 0)]
-    while stack:
-        index, lower, upper, depth = stack.pop()
-        word = int(nodes[index, 0])
-        if word & 3 == 3:
-            w, h, d = np.maximum(np.minimum(upper, bounds.cells) - lower, 0).astype(float)
-            high = 0.0 if word == 3 else nodes[index, :1].view(np.float32)[0]
-            visits = 0.5 * (w * h + h * d + d * w) * (w * h * d > 0)
-            total += w * h * d * rate * high + (leaf_cost + depth * step_cost) * visits
-            continue
-        middle_upper, middle_lower = upper.copy(), lower.copy()
-        middle_upper[word & 3] = middle_lower[word & 3] = word >> 2
-        stack.append((int(nodes[index, 1]), lower, middle_upper, depth + 1))
-        stack.append((int(nodes[index, 1]) + 1, middle_lower, upper, depth + 1))
+    total = 0.0
+    for index, lower, upper, depth in leaves_of(nodes, bounds):
+        w, h, d = (upper - lower).astype(float)
+        high = 0.0 if nodes[index, 0] == 3 else nodes[index, :1].view(np.float32)[0]
+        visits = 0.5 * (w * h + h * d + d * w) * (w * h * d > 0)
+        total += w * h * d * rate * high + (leaf_cost + depth * step_cost) * visits
     return total
 
 
@@ -141,7 +136,9 @@ def test_the_tree_costs_what_its_builder_says_and_never_more_than_one_leaf(leaf_
     cost = expected_cost(tree.nodes, bounds, 5.0, leaf_cost, 0.1 * leaf_cost)
     assert tree.cost == pytest.approx(cost, rel=1e-5)
     nx, ny, nz = bounds.cells
-    whole = 5.0 * nx * ny * nz * float(bounds.maximum.max()) + leaf_cost * 0.5 * (nx * ny + ny * nz + nz * nx)
+    whole = 5.0 * nx * ny * nz * float(bounds.majorant.max()) + leaf_cost * 0.5 * (
+        nx * ny + ny * nz + nz * nx
+    )
     assert tree.cost <= whole * (1 + 1e-9)
     if leaf_cost == 1e9:
         assert tree.leaves == 1, "where visits cost everything, nothing is split"
@@ -225,3 +222,63 @@ def test_constant_bricks_are_stored_once():
     stored = {number: samples for number, samples in bricks.stored()}
     assert (stored[bricks.top[7, 7, 7]] == 0).all()
     assert BRICK_CELLS == 8
+
+
+def quadrature_means(values, cells):
+    """Means over cubes of 4³ cells, (nz, ny, nx): Gauss–Legendre, two points per cell and axis."""
+    offsets = np.array([0.5 - 0.5 / np.sqrt(3), 0.5 + 0.5 / np.sqrt(3)])
+    along = (np.arange(BOUND_CELLS)[:, None] + offsets).reshape(-1)
+    inner = np.stack(np.meshgrid(along, along, along, indexing="ij"), -1).reshape(-1, 3)
+    means = np.empty(cells)
+    for z, y, x in np.ndindex(cells):
+        means[z, y, x] = look_up(values, inner + BOUND_CELLS * np.array([x, y, z])).mean()
+    return means
+
+
+@pytest.mark.parametrize("shape", [(1, 1, 1), (2, 3, 1), (9, 9, 9), (8, 13, 10), (17, 5, 30)])
+@pytest.mark.parametrize("channels", [1, 3])
+def test_means_of_cells_are_those_of_the_interpolant(shape, channels):
+    values = np.random.default_rng(8).random((*shape, channels)).astype(np.float32)
+    bricks = build_bricks(DenseGrid(values, UNIT_BOX))
+    means = bricks.means()
+    assert means.dtype == np.float32 and means.shape == bricks.minimum.shape == bricks.maximum.shape
+    assert means.shape == (*(2 * n for n in bricks.top.shape), channels)
+    for channel in range(channels):
+        exact = quadrature_means(values[..., channel], means.shape[:3])
+        assert np.abs(means[..., channel] - exact).max() < 1e-6
+
+
+def test_the_mean_of_a_cells_samples_is_not_that_of_the_interpolant():
+    """The test above can fail: samples on the border of a cell count half, or less, in its mean."""
+    values = np.zeros((9, 9, 9), np.float32)
+    values[0] = 1.0
+    assert build_bricks(DenseGrid(values[..., None], UNIT_BOX)).means()[0, 0, 0, 0] == 0.125
+    assert values[:5, :5, :5].mean() == np.float32(0.2)
+
+
+def test_means_of_a_sparse_grid_are_those_of_the_dense_one_it_stands_for():
+    grid = sparse_grid()
+    bricks = build_bricks(grid)
+    upper = np.array(bricks.origin) + bricks.top.shape[::-1] * np.array(BRICK_CELLS)
+    values = dense_of(grid, np.array(bricks.origin), np.maximum(upper, grid.active_box[1] + 1))
+    means = bricks.means()
+    assert means.shape == bricks.minimum.shape
+    assert np.abs(means[..., 0] - quadrature_means(values, means.shape[:3])).max() < 1e-6
+
+
+@pytest.mark.parametrize("value", [0.0, 0.1, 3.0e38, 1e-44])
+def test_constant_cells_have_their_value_as_mean(value):
+    values = np.full((20, 9, 9, 2), value, np.float32)
+    values[-1, -1, -1] = 1.0
+    means = build_bricks(DenseGrid(values, UNIT_BOX)).means()
+    assert (means[:4] == np.float32(value)).all()
+
+
+def test_extrema_and_means_of_coloured_volumes_are_those_of_each_channel():
+    values = np.random.default_rng(9).random((9, 12, 17, 3)).astype(np.float32)
+    coloured = build_bricks(DenseGrid(values, UNIT_BOX))
+    for channel in range(3):
+        grey = build_bricks(DenseGrid(values[..., channel : channel + 1], UNIT_BOX))
+        for name in ("minimum", "maximum"):
+            assert (getattr(coloured, name)[..., channel] == getattr(grey, name)[..., 0]).all()
+        assert (coloured.means()[..., channel] == grey.means()[..., 0]).all()

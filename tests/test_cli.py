@@ -243,6 +243,7 @@ def test_options_reach_render_unchanged(scene: str, tmp_path: Path, monkeypatch:
 
     monkeypatch.setattr(clvol, "render", render)
     options = ["--time", "2", "--seed", "7", "--device", "pocl", "--majorant", "grid", "--technique", "delta"]
+    options += ["--probability", "history", "--majorant-scale", "1.25", "--aov", "cells", "--aov", "null"]
     outcome = run("render", scene, "-o", tmp_path / "a.exr", *options)
     assert outcome.exit_code == 0, outcome.output
     del seen["progress"]
@@ -256,6 +257,11 @@ def test_options_reach_render_unchanged(scene: str, tmp_path: Path, monkeypatch:
         "majorant": "grid",
         "lookup": "auto",
         "absorption": "auto",
+        "probability": "history",
+        "control": "auto",
+        "majorant_scale": 1.25,
+        "step": None,
+        "aov": ("cells", "null"),
     }
 
 

@@ -5,6 +5,7 @@ path slot costs; and that the device sees the records that the host writes.
 """
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pyopencl as cl
@@ -13,10 +14,11 @@ from pictures import ball, box, gridded, hg, homogeneous, picture, volume
 from probe import Probe, medium_of, scene_of
 
 import clvol
-from clvol import layout, programs, registry
-from clvol.prepare import prepare
+from clvol import layout, programs
+from clvol.choices import Choices, prepare_for
 from clvol.scene.records import (
     ConstantEmitter,
+    ConstVolume,
     DirectionalEmitter,
     EnvmapEmitter,
     PointEmitter,
@@ -65,8 +67,8 @@ SCENES = {
 
 
 def config_of(device, described, majorant="grid", **choices):
-    resolved = {family: choices.get(family, "auto") for family in registry.FAMILIES}
-    return kernel_config(prepare(described, majorant), resolved, device)
+    chosen = Choices(majorant=majorant, **choices)
+    return kernel_config(prepare_for(described, chosen), chosen, device)
 
 
 def units(config):
@@ -211,18 +213,58 @@ def test_grey_scenes_carry_one_channel_and_smaller_paths(device):
     assert bytes_per_slot(coloured_light) - bytes_per_slot(grey) == 4 * 3 * 2
 
 
+COLOURED_GRID = box(*CUBE, gridded(volume(LUMPS[..., None] * [1, 0.5, 0.2], *CUBE), 0.5))
+
+
 def test_one_channel_per_path_costs_one_field(device):
-    grey = config_of(device, scene([fog()], [SUN]))
-    chromatic = config_of(device, scene([fog((0.5, 1.0, 1.5))], [SUN]))
-    assert (chromatic.channels, chromatic.spectrum) == (3, 1)
+    grey = config_of(device, scene([grid()], [SUN]), technique="delta")
+    chromatic = config_of(device, scene([COLOURED_GRID], [SUN]), technique="delta")
+    assert (chromatic.channels, chromatic.spectrum, chromatic.extinction) == (3, 1, 1)
     assert field_names(chromatic) - field_names(grey) == {"channel"}
 
 
+@pytest.mark.parametrize("technique", ["spectral", "spectral-decomposition", "regular", "auto"])
+def test_techniques_that_follow_all_channels_carry_them(device, technique):
+    config = config_of(device, scene([COLOURED_GRID], [SUN]), technique=technique)
+    assert (config.channels, config.spectrum, config.extinction) == (3, 3, 3)
+    assert config.weighted
+
+
+def test_homogeneous_media_of_several_colours_follow_all_channels(device):
+    config = config_of(device, scene([fog((0.5, 1.0, 1.5))], [SUN]))
+    assert (config.channels, config.spectrum, config.extinction) == (3, 3, 3)
+
+
+def test_overlapping_media_of_several_colours_follow_one_channel(device):
+    config = config_of(device, scene([fog((0.5, 1.0, 1.5)), fog()], [SUN]))
+    assert (config.channels, config.spectrum, config.extinction) == (3, 1, 1)
+
+
 def test_a_grey_medium_of_coloured_albedo_follows_all_channels_unless_absorption_is_sampled(device):
-    described = SCENES["a coloured albedo"]
-    assert config_of(device, described, absorption="weight").spectrum == 3
-    assert config_of(device, described, absorption="mixed").spectrum == 3
-    assert config_of(device, described, absorption="sample").spectrum == 1
+    described = scene([grid(albedo=(0.5, 0.9, 0.1))], [SUN])
+    for absorption, spectrum in {"weight": 3, "mixed": 3, "sample": 1}.items():
+        config = config_of(device, described, absorption=absorption)
+        assert (config.spectrum, config.extinction) == (spectrum, 1)
+    assert config_of(device, described, absorption="sample", technique="spectral").spectrum == 3
+
+
+def test_tables_of_cells_come_with_the_techniques_that_read_them(device):
+    described = scene([grid()], [SUN])
+    plain = argument_names(config_of(device, described, technique="delta", transmittance="ratio"))
+    assert not plain & {"controls", "residuals", "blackbody"}
+    decomposed = config_of(device, described, technique="decomposition", transmittance="residual-ratio")
+    assert argument_names(decomposed) - plain == {"controls", "residuals"}
+    marched = config_of(device, described, technique="marching", transmittance="marching")
+    assert plain - argument_names(marched) == {"majorants"}
+    assert not any(name.startswith("majorant/") for name in headers(marched))
+
+
+def test_emission_code_comes_with_emission(device):
+    described = scene([grid()], [SUN])
+    glowing = replace(described.shapes[0].interior, emission=ConstVolume((1.0,)))
+    config = config_of(device, scene([box(*CUBE, glowing)], ()))
+    assert "medium/emission.h" in headers(config)
+    assert "medium/emission.h" not in headers(config_of(device, described))
 
 
 def test_fields_for_several_media_come_with_several_media(device):
@@ -288,14 +330,14 @@ def test_records_have_the_same_sizes_and_offsets_on_the_device(device):
 def test_a_record_written_by_the_host_is_read_field_by_field(device):
     """A value of each kind and place in the Medium record, through a buffer of two records."""
     media = np.zeros(2, layout.MEDIUM)
-    media[1]["box_upper"], media[1]["phase_g"], media[1]["kd_root"] = (1, 2, 3), 0.25, -7
+    media[1]["box_upper"], media[1]["cell_size"], media[1]["kd_root"] = (1, 2, 3), 0.25, -7
     out = np.zeros(5, np.float32)
     flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
     probe = Probe(device, scene_of(medium_of(1.0)))
     probe.buffers["media"] = cl.Buffer(device.context, flags, hostbuf=media)
     body = """
         __global const Medium *m = scene->media + 1;
-        const float v[5] = {m->box_upper[0], m->box_upper[1], m->box_upper[2], m->phase_g, m->kd_root};
+        const float v[5] = {m->box_upper[0], m->box_upper[1], m->box_upper[2], m->cell_size, m->kd_root};
         out0[i] = v[i];"""
     probe.run([], body, [out])
     assert out.tolist() == [1, 2, 3, 0.25, -7]

@@ -37,7 +37,7 @@ def moved(scene, matrix):
     sigma_t = medium.sigma_t
     if isinstance(sigma_t, GridVolume):
         sigma_t = replace(sigma_t, index_to_world=matrix @ sigma_t.index_to_world)
-    medium = replace(medium, sigma_t=sigma_t, scale=medium.scale / factor)
+    medium = replace(medium, sigma_t=sigma_t, scale=medium.scale[0] / factor)
     eye = matrix @ scene.sensor.to_world
     eye[:3, :3] /= factor
     sensor = replace(
@@ -192,9 +192,9 @@ def test_a_coefficient_beyond_floats_is_a_clear_error():
 def test_energy_lost_to_caps_is_the_share_of_each_path_in_the_image():
     """A path that follows one of three channels weighs three times as much in a third of the image."""
     limit = Integrator(max_depth=2)
-    grey = clvol.render(scene_of(medium_of(3.0, albedo=0.9), integrator=limit), spp=256)
-    medium = replace(medium_of(1.0, albedo=0.9), sigma_t=ConstVolume((3.0, 3.0, 3.0001)))
-    coloured = clvol.render(scene_of(medium, integrator=limit), spp=256)
+    grey = clvol.render(scene_of(medium_of(np.full((3, 3, 3), 3.0), 1.0, 0.9), integrator=limit), spp=256)
+    medium = medium_of(np.full((3, 3, 3, 3), [3.0, 3.0, 3.0001]), 1.0, 0.9)
+    coloured = clvol.render(scene_of(medium, integrator=limit), spp=256, technique="delta")
     lost = [r.stats["energy_lost_to_caps"] for r in (grey, coloured)]
     assert lost[1] == pytest.approx(lost[0], rel=0.05)
     assert (grey.stats["largest_weight"], coloured.stats["largest_weight"]) == (1.0, 3.0)

@@ -1,8 +1,8 @@
 """Everything that is drawn, against the density it is drawn from, and every density against its integral.
 
 Device functions run through small kernels (`Probe`).  χ² tests use the device's own random numbers at fixed
-keys and have a false-alarm rate of 1e-4 each; `test_the_chi_square_test_rejects_a_wrong_density` and the
-wrong parameters inside the tests show that they can fail.  Everything else is compared in float64.
+keys and have a false-alarm rate of 1e-4 each; wrong parameters inside the tests show that they can fail.
+Everything else is compared in float64.  Phase functions have test_phases.py.
 """
 
 from dataclasses import replace
@@ -10,25 +10,16 @@ from dataclasses import replace
 import numpy as np
 import pyopencl as cl
 import pytest
-from pictures import gauss, hg, hg_value
+from pictures import gauss
 from probe import Probe, medium_of, scene_of
+from sampling import DRAWS, RANDOM, uniform_p_value, uniforms
 from stat_tests import FALSE_ALARM, chi2_p_value
 
 import clvol
 from clvol import layout
 from clvol.camera import camera_rays
-from clvol.scene.records import EnvmapEmitter, Film, Perspective, Phase, ReconstructionFilter
+from clvol.scene.records import EnvmapEmitter, Film, Perspective, ReconstructionFilter
 from clvol.session import render_record
-
-DRAWS = 1 << 20
-RANDOM = "const uint4 k = philox4x32((uint4)(i, 0u, 0u, 0u), (uint2)(11u, 12u));\n"
-"""Random words for work-item i, as the renderer draws them."""
-
-
-def uniforms(*names):
-    return RANDOM + "".join(
-        f"const float {n} = uniform_below_one(k.{c});\n" for n, c in zip(names, "xyzw", strict=False)
-    )
 
 
 def bare_scene(**film):
@@ -115,10 +106,6 @@ def test_streams_are_uniform_and_independent(probe):
             assert uniform_p_value((out[..., word] >> shift & 255).ravel(), 256) > FALSE_ALARM
     lagged = 64 * top[:, :-1, 0].ravel() + top[:, :-1, 0].ravel()
     assert uniform_p_value(lagged, 4096) < 1e-9  # dependent numbers are noticed
-
-
-def uniform_p_value(cells, count):
-    return chi2_p_value(np.bincount(cells, minlength=count), np.full(count, cells.size / count))
 
 
 MAGNITUDES = np.unique(
@@ -216,117 +203,6 @@ def test_frames_turn_z_onto_any_direction_and_keep_lengths(probe):
     size = np.linalg.norm(v, axis=1)
     assert np.abs(np.linalg.norm(out, axis=1) / size - 1).max() < 1e-6
     assert (np.abs((out.astype(float) * n).sum(axis=1) - v[:, 2]) / size).max() < 1e-6
-
-
-# -- phase functions ---------------------------------------------------------------------------------
-
-GS = [0.0, 1e-4, -1e-4, 0.5, -0.7, 0.99, -0.99, 0.999999, -0.999999]
-
-
-def phase_probe(device, phase):
-    return Probe(device, scene_of(medium_of(1.0, albedo=0.5, phase=phase)))
-
-
-@pytest.fixture(scope="module")
-def hg_probe(device):
-    """Any g: the medium's record is overwritten before each run."""
-    return phase_probe(device, hg(0.5))
-
-
-def set_g(probe, g):
-    media = np.zeros(1, layout.MEDIUM)
-    cl.enqueue_copy(probe.device.queue, media, probe.buffers["media"], is_blocking=True)
-    media["phase_g"] = g
-    flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
-    probe.buffers["media"] = cl.Buffer(probe.device.context, flags, hostbuf=media)
-
-
-def sampled_phase(probe):
-    """Per draw: 1 - cosine of the angle off the peak (which is behind where g < 0), azimuth, sampled pdf,
-    evaluated pdf."""
-    out = np.zeros((DRAWS, 4), np.float32)
-    body = (
-        uniforms("u", "v")
-        + """
-        const float3 wo = (float3)(0.48f, -0.6f, 0.64f);
-        const float3 side = (float3)(0.8f, 0.0f, -0.6f), third = cross(wo, side);
-        float pdf;
-        const float3 wi = phase_sample(scene->media, wo, u, v, &pdf);
-        const float3 h = (scene->media->phase_g < 0.0f ? -wo : wo) - wi;
-        const float azimuth = atan2(dot(wi, third), dot(wi, side));
-        vstore4((float4)(0.5f * dot(h, h), azimuth, pdf, phase_pdf(scene->media, wo, wi)), i, out0);"""
-    )
-    probe.run(["phase/phase.h"], body, [out])
-    return out.astype(float).T
-
-
-def hg_cdf(g, x):
-    """Share of directions whose 1 - cosine is at most x."""
-    if abs(g) < 1e-3:  # the density is 1/2 (1 + 3 g cos) up to g²
-        return x / 2 + 3 * g * (x / 2 - x * x / 4)
-    return (1 - g * g) / (2 * g) * (1 / (1 - g) - 1 / np.sqrt((1 - g) ** 2 + 2 * g * x))
-
-
-def phase_p_value(g, x, azimuth):
-    """χ² over 32 slices of equal probability by 8 azimuths."""
-    low, high = np.zeros(31), np.full(31, 2.0)
-    for _ in range(80):
-        middle = (low + high) / 2
-        below = hg_cdf(g, middle) < np.arange(1, 32) / 32
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    cells = 8 * np.searchsorted(low, x) + np.clip((azimuth / np.pi + 1) * 4, 0, 7.999).astype(int)
-    return uniform_p_value(cells, 256)
-
-
-@pytest.mark.parametrize("g", GS)
-def test_henyey_greenstein_directions_follow_the_phase_function(hg_probe, g):
-    """χ² where a float direction resolves the lobe; mean cosine g and second Legendre moment g² always."""
-    set_g(hg_probe, g)
-    g = float(np.float32(g))
-    x, azimuth, pdf, evaluated = sampled_phase(hg_probe)
-    a = abs(g)
-    if a < 0.9999:
-        assert phase_p_value(a, x, azimuth) > FALSE_ALARM
-        assert phase_p_value(a + 0.01 if a < 0.5 else a - 0.01, x, azimuth) < 1e-9
-    cosine = (1 - x) * (-1 if g < 0 else 1)
-    for n, moment in ((1, cosine), (2, 1.5 * cosine**2 - 0.5)):
-        error = moment.std() / np.sqrt(DRAWS) + 1e-7  # 1e-7: directions are floats
-        assert abs(moment.mean() - g**n) < 3.9 * error, f"Legendre moment {n}"
-    assert np.isfinite(pdf).all() and (pdf > 0).all()
-    # near the peak a direction's rounding moves the pdf that is looked up for it
-    blur = 3e-7 * np.sqrt(x) + 1e-13
-    tolerance = 1e-5 + 3 * a * blur / ((1 - a) ** 2 / 2 + a * x)
-    assert (np.abs(evaluated / pdf - 1) < tolerance).all()
-
-
-def test_isotropic_directions_are_uniform(device):
-    x, azimuth, pdf, evaluated = sampled_phase(phase_probe(device, Phase()))
-    assert phase_p_value(0.0, x, azimuth) > FALSE_ALARM
-    np.testing.assert_allclose(pdf, 1 / (4 * np.pi), rtol=1e-6)
-    np.testing.assert_allclose(evaluated, pdf, rtol=1e-6)
-
-
-@pytest.mark.parametrize("g", GS)
-def test_the_henyey_greenstein_pdf_is_the_formula_and_integrates_to_one(probe, g):
-    """Over the distance from the peak: 1 - cos, or 1 + cos where g < 0."""
-    edges = np.concatenate([[0.0], np.geomspace(1e-16, 2.0, 120)])
-    x, w = (a.ravel() for a in gauss(edges[:-1], edges[1:], 8))
-    x32, out, g32 = x.astype(np.float32), np.zeros(x.size, np.float32), float(np.float32(g))
-    a = abs(g32)
-    probe.run(["phase/phase.h"], f"out0[i] = hg_pdf({a!r}f, in0[i]);", [out], [x32])
-    exact = (1 - a * a) / (4 * np.pi * ((1 - a) ** 2 + 2 * a * x32.astype(float)) ** 1.5)
-    assert np.abs(out / exact - 1).max() < 2e-6
-    assert abs(2 * np.pi * (out * w).sum() - 1) < 1e-5
-    if a < 0.9:  # and that is the textbook's form
-        cosine = (1 - x) * np.sign(g32 + 1e-9)
-        np.testing.assert_allclose(exact, hg_value(g32, cosine), rtol=1e-5)
-
-
-def test_the_chi_square_test_rejects_a_wrong_density(hg_probe):
-    set_g(hg_probe, 0.5)
-    x, azimuth, _, _ = sampled_phase(hg_probe)
-    assert phase_p_value(0.505, x, azimuth) < FALSE_ALARM
-    assert phase_p_value(0.5, x, np.abs(azimuth)) < FALSE_ALARM
 
 
 # -- environment maps --------------------------------------------------------------------------------

@@ -192,7 +192,7 @@ def test_includes_bring_plugins_defaults_and_their_own_folder(load, tmp_path):
         <shape type="cube"><bsdf type="null"/><ref id="fog" name="interior"/></shape>""",
         density=9,
     )
-    assert scene.shapes[0].interior.scale == 9.0
+    assert scene.shapes[0].interior.scale == (9.0,)
     assert len(scene.emitters) == 1
 
 

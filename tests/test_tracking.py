@@ -1,169 +1,208 @@
-"""Every tracker against the exact free-flight distribution and transmittance, on the device functions."""
+"""The contract, on the device functions: every technique's collisions follow the exact distribution, every
+transmittance estimate has the exact mean, whatever the majorant and the look-up (METHODS §1)."""
+
+import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from fields import FIELDS, RAYS, exit_distance, optical_depth
+from fields import CHROMATIC, FIELDS, RAYS, exit_distance
 from probe import Probe, medium_of, scene_of
-from stat_tests import FALSE_ALARM, chi2_p_value, largest_z, sidak, z_score
+from stat_tests import FALSE_ALARM, largest_z, sidak, z_score
+from walks import (
+    BINS,
+    collision_p_value,
+    exact_depth,
+    sample_walks,
+    scene_with,
+    transmittance_walks,
+    unbiased,
+    weighted_z,
+)
 
 from clvol import registry
-from clvol.upload import upload_scene
 
-SCALES = {"constant": 1.5, "ramp": 2.0, "sparse": 25.0, "vacuum": 1.0}
-WALKS = 1 << 19
-BINS = 40
-TRACKED = [name for name in registry.TECHNIQUES]
-ESTIMATED = [name for name, choice in registry.TRANSMITTANCES.items() if choice.header]
-CASES = len(FIELDS) * len(RAYS)
+WALKS = 1 << 16
+TECHNIQUES, TRANSMITTANCES = unbiased("technique"), unbiased("transmittance")
+GREY_CASES = len(FIELDS) * len(RAYS)
+CHROMATIC_RAYS = ("oblique", "on a cell's face")
 
-RAY_BODY = """
-    const SampleKey key = {i, 0, 0};
-    const uint4 k = decision_block((uint2)(%d, 77), key, BLOCK_WALK, 0);
-    Stream stream = stream_begin(k.z, k.w);
-    Tally tally = {0, 0, 0};
-    __global const Medium *medium = scene->media;
-    Ray ray;
-    ray.o = (float3)(in0[0], in0[1], in0[2]);
-    ray.d = (float3)(in0[3], in0[4], in0[5]);
-    const Ray index_ray = transform_ray(scene->volumes[medium->sigma_t_volume].world_to_index, ray);
-"""
-COLLISION_BODY = (
-    RAY_BODY
-    + """
-    Collision collision;
-    collision.channel = 0;
-    out0[i] = sample_collision(scene, medium, index_ray, in0[6], k.x, &stream, &tally, &collision)
-        ? collision.t : -1.0f;
-    out1[i] = tally.violations + tally.exhausted;
-    out2[i] = tally.lookups;
-"""
-)
-TRANSMITTANCE_BODY = (
-    RAY_BODY
-    + """
-    out0[i] = estimate_transmittance(scene, medium, index_ray, in0[6], 0, k.x, &stream, &tally);
-    out1[i] = tally.violations + tally.exhausted;
-    out2[i] = tally.lookups;
-"""
-)
+
+def combinations(family):
+    """(name, majorant, look-up) of everything that is not refused."""
+    table = registry.FAMILIES[family]
+    return [
+        (name, majorant, lookup)
+        for name, majorant, lookup in itertools.product(
+            unbiased(family), registry.MAJORANTS, registry.LOOKUPS
+        )
+        if lookup == "exact" or table[name].linear
+    ]
+
+
+def chromatic_combinations(family):
+    """The same, stochastic look-ups over grids only."""
+    return [c for c in combinations(family) if c[2] == "exact" or c[1] == "grid"]
 
 
 @pytest.fixture(scope="module")
 def probes(device):
-    """Probes by (field, majorant), made when first asked for."""
+    """Probes by field and choices, made when first asked for."""
     made = {}
 
-    def get(field, majorant):
-        if (field, majorant) not in made:
-            made[field, majorant] = Probe(
-                device, scene_of(medium_of(FIELDS[field](), SCALES[field])), majorant=majorant
-            )
-        return made[field, majorant]
+    def get(field, **choices):
+        key = (field, *sorted(choices.items()))
+        if key not in made:
+            made[key] = Probe(device, scene_with(field), **choices)
+        return made[key]
 
     return get
 
 
-def walk(probe, headers, body, ray, length, seed=1, walks=WALKS):
-    """Many walks along one ray of the unit cube: values, look-ups per walk; no bound may be violated."""
-    origin, direction = ray
-    centred = origin - probe.prepared.centre
-    record = np.array([*centred, *direction, length], np.float32)
-    out = tuple(np.empty(walks, t) for t in (np.float32, np.uint32, np.uint32))
-    values, flaws, lookups = probe.run(headers, body % seed, out, [record])
-    assert flaws.sum() == 0
-    return values, lookups.mean()
+def choices_of(family, name, majorant, lookup):
+    """Choices that compile this one, the other family at what goes with every look-up."""
+    other = {"technique": "delta", "transmittance": "ratio"} | {family: name}
+    return other | {"majorant": majorant, "lookup": lookup}
 
 
-def headers_of(majorant, tracker):
-    return ["density/volume.h", registry.MAJORANTS[majorant].header, tracker]
-
-
-def collision_p_value(distances, tau, length):
-    """χ² of sampled distances (−1: none) in bins of equal probability, and the escapes."""
-    escape = np.exp(-tau[-1])
-    if tau[-1] == 0:
-        return 1.0 if (distances < 0).all() else 0.0
-    t = np.linspace(0, length, len(tau))
-    cdf = -np.expm1(-tau)
-    edges = np.interp(np.linspace(0, cdf[-1], BINS + 1)[1:-1], cdf, t)
-    hit = distances[distances >= 0]
-    counts = np.bincount(np.searchsorted(edges, hit), minlength=BINS)
-    expected = np.diff(np.concatenate([[0], np.interp(edges, t, cdf), [cdf[-1]]]))
-    return chi2_p_value([*counts, len(distances) - len(hit)], len(distances) * np.append(expected, escape))
-
-
-@pytest.mark.parametrize("majorant", registry.MAJORANTS)
-@pytest.mark.parametrize("field", FIELDS)
-@pytest.mark.parametrize("technique", TRACKED)
-def test_free_flights_follow_the_exact_distribution(probes, technique, field, majorant):
-    headers = headers_of(majorant, registry.TECHNIQUES[technique].header)
-    level = sidak(FALSE_ALARM, CASES * len(registry.MAJORANTS))
-    for name, ray in RAYS.items():
+@pytest.mark.parametrize(("technique", "majorant", "lookup"), combinations("technique"))
+def test_collisions_follow_the_exact_distribution(probes, technique, majorant, lookup):
+    weighted = registry.TECHNIQUES[technique].weighted
+    level, bound = sidak(FALSE_ALARM, GREY_CASES), largest_z(GREY_CASES * (BINS + 1))
+    for field, (name, ray) in itertools.product(FIELDS, RAYS.items()):
+        probe = probes(field, **choices_of("technique", technique, majorant, lookup))
         length = exit_distance(*ray)
-        distances, _ = walk(probes(field, majorant), headers, COLLISION_BODY, ray, length)
-        tau = optical_depth(FIELDS[field](), *ray, length, SCALES[field])
-        assert collision_p_value(distances, tau, length) > level, f"ray {name}"
+        t, weights, _, flaws, _ = sample_walks(probe, ray, length, WALKS)
+        tau = exact_depth(field, name)[0]
+        where = f"{field}, ray {name}"
+        assert flaws.sum() == 0, where
+        if weighted and tau[-1] > 0:
+            assert weighted_z(t, weights[:, 0], tau, length).max() < bound, where
+        else:
+            assert (weights == 1).all(), where
+            assert collision_p_value(t, tau, length) > level, where
 
 
-@pytest.mark.parametrize("majorant", registry.MAJORANTS)
-@pytest.mark.parametrize("field", FIELDS)
-@pytest.mark.parametrize("transmittance", ESTIMATED)
-def test_transmittance_is_unbiased(probes, transmittance, field, majorant):
-    headers = headers_of(majorant, registry.TRANSMITTANCES[transmittance].header)
-    bound = largest_z(CASES * len(registry.MAJORANTS))
-    for name, ray in RAYS.items():
+@pytest.mark.parametrize(("technique", "majorant", "lookup"), chromatic_combinations("technique"))
+def test_collisions_of_each_channel_follow_its_distribution(probes, technique, majorant, lookup):
+    bound = largest_z(len(CHROMATIC) * len(CHROMATIC_RAYS) * 3 * (BINS + 1))
+    for field, name in itertools.product(CHROMATIC, CHROMATIC_RAYS):
+        probe = probes(field, **choices_of("technique", technique, majorant, lookup))
+        ray, length = RAYS[name], exit_distance(*RAYS[name])
+        tau = exact_depth(field, name)
+        together = probe.config.spectrum == 3
+        assert together == registry.TECHNIQUES[technique].all_channels
+        walks = None
+        for channel in range(3):
+            if walks is None or not together:
+                walks = sample_walks(probe, ray, length, WALKS, channel=channel)
+            t, weights, _, flaws, _ = walks
+            assert flaws.sum() == 0
+            z = weighted_z(t, weights[:, channel if together else 0], tau[channel], length)
+            assert z.max() < bound, f"{field}, ray {name}, channel {channel}"
+
+
+def assert_mean(values, exact, comparisons, where):
+    values = values.astype(float)
+    rounding = (1e-6 * exact) ** 2
+    z = abs(z_score(values.mean(), values.var() / len(values) + rounding, exact))
+    assert z < largest_z(comparisons), f"{where}: {values.mean():.7f}, exact {exact:.7f}, {z:.1f} sigma"
+
+
+def assert_transmittance(transmittance, values, exact, comparisons, where):
+    if exact == 1.0:
+        assert (values == 1.0).all(), f"{where}: vacuum transmits everything, with no variance"
+    elif transmittance == "regular":
+        assert np.ptp(values) == 0, f"{where}: regular transmittance has no variance"
+        assert abs(values[0] - exact) < 1e-5 * exact, where
+    else:
+        assert_mean(values, exact, comparisons, where)
+
+
+@pytest.mark.parametrize(("transmittance", "majorant", "lookup"), combinations("transmittance"))
+def test_transmittance_is_unbiased(probes, transmittance, majorant, lookup):
+    for field, (name, ray) in itertools.product(FIELDS, RAYS.items()):
+        probe = probes(field, **choices_of("transmittance", transmittance, majorant, lookup))
         length = exit_distance(*ray)
-        values, _ = walk(probes(field, majorant), headers, TRANSMITTANCE_BODY, ray, length)
-        exact = np.exp(-optical_depth(FIELDS[field](), *ray, length, SCALES[field])[-1])
-        if exact == 1.0:
-            assert (values == 1.0).all(), "vacuum transmits everything, with no variance"
-            continue
-        z = z_score(values.mean(dtype=float), values.var(dtype=float) / WALKS, exact)
-        assert abs(z) < bound, f"ray {name}: {values.mean():.6f}, exact {exact:.6f}, {z:.1f} sigma"
+        values, flaws, _ = transmittance_walks(probe, ray, length, WALKS)
+        assert flaws.sum() == 0
+        exact = np.exp(-exact_depth(field, name)[0, -1])
+        assert_transmittance(transmittance, values[:, 0], exact, GREY_CASES, f"{field}, ray {name}")
 
 
-@pytest.mark.parametrize("majorant", registry.MAJORANTS)
-@pytest.mark.parametrize("technique", TRACKED)
-def test_density_is_right_to_half_a_percent(probes, technique, majorant):
-    """The share of walks that collide pins the density: 0.5 % more or less of it is rejected."""
+@pytest.mark.parametrize(("transmittance", "majorant", "lookup"), chromatic_combinations("transmittance"))
+def test_transmittance_of_each_channel_is_unbiased(probes, transmittance, majorant, lookup):
+    """As a path that follows all channels needs it, and (with exact look-ups) one that follows one."""
+    for technique in ("spectral", "delta") if lookup == "exact" else ("spectral",):
+        check_channels(probes, transmittance, majorant, lookup, technique)
+
+
+def check_channels(probes, transmittance, majorant, lookup, technique):
+    cases = len(CHROMATIC) * len(CHROMATIC_RAYS) * 3
+    for field, name in itertools.product(CHROMATIC, CHROMATIC_RAYS):
+        choices = choices_of("transmittance", transmittance, majorant, lookup) | {"technique": technique}
+        probe = probes(field, **choices)
+        ray, length = RAYS[name], exit_distance(*RAYS[name])
+        exact = np.exp(-exact_depth(field, name)[:, -1])
+        walks = None
+        for channel in range(3):
+            if walks is None or technique == "delta":
+                walks = transmittance_walks(probe, ray, length, WALKS // 2, channel=channel)
+            values, flaws, _ = walks
+            assert flaws.sum() == 0
+            own = values[:, channel if technique == "spectral" else 0]
+            assert_transmittance(transmittance, own, exact[channel], cases, f"{field}, {name}, {channel}")
+
+
+def half_percent_cases(family):
+    """One majorant and look-up for each name, by turns."""
+    turns = itertools.cycle(itertools.product(registry.LOOKUPS, registry.MAJORANTS))
+    table = registry.FAMILIES[family]
+    return [
+        (name, majorant, lookup if table[name].linear else "exact")
+        for name, (lookup, majorant) in zip(unbiased(family), turns, strict=False)
+    ]
+
+
+@pytest.mark.parametrize(("technique", "majorant", "lookup"), half_percent_cases("technique"))
+def test_density_is_right_to_half_a_percent(probes, technique, majorant, lookup):
+    """The weight of the walks that collide pins the density: 0.5 % more or less of it is rejected."""
     ray, walks = RAYS["oblique"], 1 << 22
     length = exit_distance(*ray)
-    headers = headers_of(majorant, registry.TECHNIQUES[technique].header)
-    distances, _ = walk(probes("ramp", majorant), headers, COLLISION_BODY, ray, length, walks=walks)
-    share = (distances >= 0).mean()
-    tau = optical_depth(FIELDS["ramp"](), *ray, length, SCALES["ramp"])[-1]
-    bound = largest_z(len(registry.MAJORANTS))
+    probe = probes("ramp", **choices_of("technique", technique, majorant, lookup))
+    t, weights, *_ = sample_walks(probe, ray, length, walks, seed=2)
+    share = np.where(t >= 0, weights[:, 0], 0.0).astype(float)
+    tau = exact_depth("ramp", "oblique")[0, -1]
+    bound = largest_z(1)
     deviations = [
-        z_score(share, share * (1 - share) / walks, -np.expm1(-factor * tau))
-        for factor in (0.995, 1.0, 1.005)
+        z_score(share.mean(), share.var() / walks, -np.expm1(-factor * tau)) for factor in (0.995, 1.0, 1.005)
     ]
     assert abs(deviations[1]) < bound
     assert deviations[0] > bound and deviations[2] < -bound
 
 
-@pytest.mark.parametrize("majorant", registry.MAJORANTS)
-@pytest.mark.parametrize("transmittance", ESTIMATED)
-def test_transmittance_is_right_to_half_a_percent(probes, transmittance, majorant):
+@pytest.mark.parametrize(("transmittance", "majorant", "lookup"), half_percent_cases("transmittance"))
+def test_transmittance_is_right_to_half_a_percent(probes, transmittance, majorant, lookup):
     ray, walks = RAYS["oblique"], 1 << 22
     length = exit_distance(*ray)
-    headers = headers_of(majorant, registry.TRANSMITTANCES[transmittance].header)
-    values, _ = walk(probes("ramp", majorant), headers, TRANSMITTANCE_BODY, ray, length, walks=walks)
-    exact = np.exp(-optical_depth(FIELDS["ramp"](), *ray, length, SCALES["ramp"])[-1])
-    z = [
-        z_score(values.mean(dtype=float), values.var(dtype=float) / walks, f * exact)
-        for f in (0.995, 1, 1.005)
-    ]
-    bound = largest_z(len(registry.MAJORANTS))
+    probe = probes("ramp", **choices_of("transmittance", transmittance, majorant, lookup))
+    values, _, _ = transmittance_walks(probe, ray, length, walks, seed=2)
+    exact = np.exp(-exact_depth("ramp", "oblique")[0, -1])
+    values = values.astype(float)
+    variance = max(values.var() / walks, (1e-6 * exact) ** 2)  # rounding, where there is no variance
+    z = [z_score(values.mean(), variance, f * exact) for f in (0.995, 1, 1.005)]
+    bound = largest_z(1)
     assert abs(z[1]) < bound
     assert z[0] > bound and z[2] < -bound
 
 
-def test_empty_space_costs_no_lookup(probes):
+@pytest.mark.parametrize("technique", TECHNIQUES)
+def test_empty_space_costs_no_lookup(probes, technique):
     for majorant in registry.MAJORANTS:
-        headers = headers_of(majorant, registry.TECHNIQUES["delta"].header)
+        probe = probes("vacuum", **choices_of("technique", technique, majorant, "exact"))
         length = exit_distance(*RAYS["oblique"])
-        _, lookups = walk(probes("vacuum", majorant), headers, COLLISION_BODY, RAYS["oblique"], length)
-        assert lookups == 0
+        *_, lookups = sample_walks(probe, RAYS["oblique"], length, 1 << 12)
+        assert lookups.sum() == 0
 
 
 def test_local_majorants_need_fewer_lookups(device):
@@ -171,39 +210,83 @@ def test_local_majorants_need_fewer_lookups(device):
     values[:, :, 30:] = 1.0
     ray, cost = RAYS["oblique"], {}
     for majorant in registry.MAJORANTS:
-        probe = Probe(device, scene_of(medium_of(values, 8.0)), majorant=majorant)
-        headers = headers_of(majorant, registry.TRANSMITTANCES["ratio"].header)
-        _, cost[majorant] = walk(probe, headers, TRANSMITTANCE_BODY, ray, exit_distance(*ray), walks=1 << 14)
+        probe = Probe(device, scene_of(medium_of(values, 8.0, 0.5)), majorant=majorant, transmittance="ratio")
+        *_, lookups = transmittance_walks(probe, ray, exit_distance(*ray), 1 << 14)
+        cost[majorant] = lookups.mean()
     assert max(cost["grid"], cost["kdtree"]) < 0.6 * cost["global"]
 
 
-def test_a_majorant_too_low_by_a_tenth_is_caught(device):
-    """Violations are counted, and the distribution test rejects what delta tracking makes of it."""
-    probe = Probe(device, scene_of(medium_of(FIELDS["constant"](), 1.5)), majorant="grid")
-    for bounds in probe.prepared.bounds.values():
-        bounds.maximum[...] *= np.float32(0.9)
-    probe.buffers |= upload_scene(device, probe.prepared, probe.config)
-    ray = RAYS["oblique"]
-    length = exit_distance(*ray)
-    record = np.array([*(ray[0] - probe.prepared.centre), *ray[1], length], np.float32)
-    out = tuple(np.empty(WALKS, t) for t in (np.float32, np.uint32, np.uint32))
-    headers = headers_of("grid", registry.TECHNIQUES["delta"].header)
-    distances, violations, _ = probe.run(headers, COLLISION_BODY % 1, out, [record])
-    assert violations.sum() > 0
-    tau = optical_depth(FIELDS["constant"](), *ray, length, 1.5)
-    assert collision_p_value(distances, tau, length) < FALSE_ALARM
-
-
-@pytest.mark.parametrize("transmittance", ESTIMATED)
+@pytest.mark.parametrize("transmittance", TRANSMITTANCES)
 def test_small_transmittances_survive_roulette(device, transmittance):
     """Where most walks come below the roulette's threshold: an error of 1 % in a survivor's weight shows."""
-    probe = Probe(device, scene_of(medium_of(FIELDS["ramp"](), 6.0)), majorant="global")
+    scene = scene_of(medium_of(FIELDS["ramp"](), 6.0, 0.5))
+    probe = Probe(device, scene, majorant="global", transmittance=transmittance)
     ray, walks = RAYS["oblique"], 1 << 22
     length = exit_distance(*ray)
-    headers = headers_of("global", registry.TRANSMITTANCES[transmittance].header)
-    values, _ = walk(probe, headers, TRANSMITTANCE_BODY, ray, length, walks=walks)
-    exact = np.exp(-optical_depth(FIELDS["ramp"](), *ray, length, 6.0)[-1])
-    error = values.var(dtype=float) / walks
+    values, _, _ = transmittance_walks(probe, ray, length, walks)
+    exact = np.exp(-3.0 * exact_depth("ramp", "oblique")[0, -1])
+    error = max(values.var(dtype=float) / walks, (1e-5 * exact) ** 2)
     assert exact < 0.1
     assert abs(z_score(values.mean(dtype=float), error, exact)) < largest_z(1)
     assert z_score(values.mean(dtype=float), error, 0.99 * exact) > largest_z(1)
+
+
+@pytest.mark.parametrize("rule", registry.PROBABILITIES)
+@pytest.mark.parametrize("technique", ["spectral", "spectral-decomposition"])
+def test_every_rule_serves_a_constant_medium_of_three_colours(device, technique, rule):
+    """Where the control is the whole majorant of the densest channel, the others still need null events."""
+    values = np.full((9, 8, 10), 0.7, np.float32)
+    scene = scene_of(replace(medium_of(values, 1.0, 0.5), scale=(1.0, 0.5, 0.1)))
+    probe = Probe(device, scene, technique=technique, probability=rule)
+    length = exit_distance(*RAYS["oblique"])
+    t, weights, *_ = sample_walks(probe, RAYS["oblique"], length, 1 << 18)
+    escaped = np.where((t < 0)[:, None], weights, 0.0).astype(float)
+    exact = np.exp(-0.7 * length * np.array([1.0, 0.5, 0.1]))
+    z = z_score(escaped.mean(axis=0), escaped.var(axis=0) / len(escaped), exact)
+    assert np.abs(z).max() < largest_z(3), f"{escaped.mean(axis=0)}, not {exact}"
+    assert np.abs(weights).max() < 1000
+
+
+@pytest.mark.parametrize("scale", [1e-25, 1e25])
+@pytest.mark.parametrize("technique", TECHNIQUES)
+def test_coefficients_of_any_size_leave_the_weights_alone(device, technique, scale):
+    """Products of two coefficients would run over a float, or under it."""
+    values = 0.2 + np.random.default_rng(2).random((9, 8, 10), np.float32)
+    scene = scene_of(replace(medium_of(values, 1.0, 0.5), scale=(scale, 0.5 * scale, 0.1 * scale)))
+    probe = Probe(device, scene, technique=technique, majorant="grid")
+    t, weights, *_ = sample_walks(probe, RAYS["oblique"], 0.5, 1 << 12)
+    assert np.isfinite(weights).all()
+    assert (t >= 0).all() if scale > 1 else (t < 0).all()
+    assert weights.mean() == pytest.approx(1.0, rel=0.2)
+
+
+@pytest.mark.parametrize("depth", [30.0, 3e5])
+def test_a_power_series_survives_thick_media(device, depth):
+    """Estimates neither run over nor grow biased where the majorant's optical depth is large."""
+    values = np.full((16, 16, 16), 0.7 * 0.3 / depth, np.float32)
+    values[0, 0, 0] = 1.0  # one dense voxel, off the ray, makes the bound loose
+    probe = Probe(
+        device, scene_of(medium_of(values, depth, 0.5)), transmittance="power-series", majorant="global"
+    )
+    ray = RAYS["along an axis"]
+    estimates, flaws, _ = transmittance_walks(probe, ray, 0.9, 1 << 8)
+    assert flaws.sum() == 0
+    assert estimates.mean(dtype=float) == pytest.approx(np.exp(-0.7 * 0.3 * 0.9), rel=1e-4)
+    noise = (np.random.default_rng(3).random((16, 16, 16)) < 0.5).astype(np.float32)
+    probe = Probe(
+        device, scene_of(medium_of(noise, depth, 0.5)), transmittance="power-series", lookup="stochastic"
+    )
+    estimates, *_ = transmittance_walks(probe, RAYS["oblique"], 1.0, 1 << 10)
+    assert np.isfinite(estimates).all()
+
+
+def test_marching_is_biased_until_its_steps_are_fine(device):
+    """exp of a noisy sum is too large on the mean: the baseline shows it."""
+    ray, length = RAYS["oblique"], exit_distance(*RAYS["oblique"])
+    exact = np.exp(-exact_depth("sparse", "oblique")[0, -1])
+    for step, is_biased in ((0.5, True), (1e-3, False)):
+        probe = Probe(device, scene_with("sparse"), technique="marching", transmittance="marching", step=step)
+        estimates = transmittance_walks(probe, ray, length, 1 << 14)[0].astype(float)
+        assert (abs(estimates.mean() / exact - 1) > 0.02) == is_biased
+        t, *_ = sample_walks(probe, ray, length, 1 << 18)
+        assert (collision_p_value(t, exact_depth("sparse", "oblique")[0], length) < FALSE_ALARM) == is_biased

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import click
 
+from clvol.choices import Choices, prepare_for
 from clvol.cli_options import Definition, RegistryChoice
 from clvol.config import KernelConfig
 from clvol.device import Device, open_device
-from clvol.prepare import PreparedScene, prepare
-from clvol.registry import FAMILIES, check_choice
+from clvol.prepare import PreparedScene
+from clvol.registry import FAMILIES
 from clvol.scene import load_file
 from clvol.session import Session, kernel_config
 
@@ -22,7 +23,7 @@ class OpenScene:
 
     device: Device
     prepared: PreparedScene
-    choices: dict[str, str]
+    choices: Choices
 
     def config(self) -> KernelConfig:
         """What is compiled for it."""
@@ -41,9 +42,9 @@ def open_scene(
     settled = {}
     for family in FAMILIES:
         value = choices.get(family, "auto")
-        value = scene.integrator.choices.get(family, "auto") if value == "auto" else value
-        settled[family] = check_choice(family, value)
-    return OpenScene(open_device(pattern), prepare(scene, settled["majorant"]), settled)
+        settled[family] = scene.integrator.choices.get(family, "auto") if value == "auto" else value
+    chosen = Choices(**settled)
+    return OpenScene(open_device(pattern), prepare_for(scene, chosen), chosen)
 
 
 def choice_options(command: Callable) -> Callable:

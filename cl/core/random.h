@@ -10,7 +10,7 @@
 #define BLOCK_CAMERA 0u    /* pixel x, pixel y, channel, - */
 #define BLOCK_WALK 1u      /* first distance, event, stream seed (2); one block per interval walked */
 #define BLOCK_LIGHT 2u     /* light choice, light point (2), - */
-#define BLOCK_DIRECTION 3u /* scattered direction (2), roulette, - */
+#define BLOCK_DIRECTION 3u /* scattered direction (2), roulette, lobe of the phase function */
 #define BLOCK_SHADOW 4u    /* first distance, -, stream seed (2); one block per interval walked */
 
 /* Which numbers a path reads: its pixel and sample, and how far along it is. */
@@ -110,7 +110,7 @@ INLINE bool choose_event(uint k, float part, float rest)
 {
     const float rarer = min_of(part, rest);
     const bool happened = uniform_float(k) * (part + rest) < rarer;
-    return (part < rest) ? happened : !happened;
+    return (part <= rest) ? happened : !happened;
 }
 
 #endif

@@ -8,39 +8,88 @@
 
 #define BRICK_SAMPLES 729
 
-/* First sample of the brick that holds cell (x, y, z). */
-INLINE __global const float *volume_brick(const Scene *scene, __global const Volume *volume,
-                                                 int x, int y, int z)
-{
-    const int top = ((z >> 3) * volume->bricks[1] + (y >> 3)) * volume->bricks[0] + (x >> 3);
-    const uint brick = (uint)scene->tops[volume->top_offset + top];
-    return scene->bricks + (size_t)(volume->brick_offset + brick) * BRICK_SAMPLES;
-}
+/* The interpolation cell that holds a point: its first corner's first channel, and the place inside. */
+typedef struct {
+    __global const float *corner;
+    int stride; /* channels of a sample */
+    float fx, fy, fz;
+} VolumeCell;
 
-/* Value of one channel of `volume` at index position p. */
-INLINE float volume_value(const Scene *scene, __global const Volume *volume, float3 p, int channel)
+INLINE VolumeCell volume_cell(const Scene *scene, __global const Volume *volume, float3 p)
 {
-    const int stride = CLVOL_HAS_COLOURED_VOLUME ? volume->channels : 1;
-    channel = stride > 1 ? channel : 0; /* a grey volume serves every channel */
     const float x = clamp_to(p.x, 0.0f, (float)(volume->size[0] - 1));
     const float y = clamp_to(p.y, 0.0f, (float)(volume->size[1] - 1));
     const float z = clamp_to(p.z, 0.0f, (float)(volume->size[2] - 1));
     const int ix = min_int((int)x, volume->size[0] - 2);
     const int iy = min_int((int)y, volume->size[1] - 2);
     const int iz = min_int((int)z, volume->size[2] - 2);
-    __global const float *brick = volume_brick(scene, volume, ix, iy, iz);
-    const float fx = x - (float)ix, fy = y - (float)iy, fz = z - (float)iz;
-    const int corner = ((iz & 7) * 81 + (iy & 7) * 9 + (ix & 7));
-    if (CLVOL_HAS_NEAREST && (!CLVOL_HAS_TRILINEAR || volume->nearest)) {
-        const int nearest = corner + (fx >= 0.5f ? 1 : 0) + (fy >= 0.5f ? 9 : 0) + (fz >= 0.5f ? 81 : 0);
-        return brick[nearest * stride + channel];
-    }
-    __global const float *c = brick + corner * stride + channel;
-    const float c00 = lerp(c[0], c[stride], fx);
-    const float c10 = lerp(c[9 * stride], c[10 * stride], fx);
-    const float c01 = lerp(c[81 * stride], c[82 * stride], fx);
-    const float c11 = lerp(c[90 * stride], c[91 * stride], fx);
-    return lerp(lerp(c00, c10, fy), lerp(c01, c11, fy), fz);
+    const int top = ((iz >> 3) * volume->bricks[1] + (iy >> 3)) * volume->bricks[0] + (ix >> 3);
+    const uint brick = (uint)scene->tops[volume->top_offset + top];
+    VolumeCell cell;
+    cell.stride = CLVOL_HAS_COLOURED_VOLUME ? volume->channels : 1;
+    cell.corner = scene->bricks + (size_t)(volume->brick_offset + brick) * BRICK_SAMPLES +
+                  ((iz & 7) * 81 + (iy & 7) * 9 + (ix & 7)) * cell.stride;
+    cell.fx = x - (float)ix;
+    cell.fy = y - (float)iy;
+    cell.fz = z - (float)iz;
+    return cell;
+}
+
+/* The corner that lies beyond the given fractions of the cell: (½, ½, ½) takes the nearest sample. */
+INLINE int cell_corner(const VolumeCell *cell, float x, float y, float z)
+{
+    return ((cell->fx >= x ? 1 : 0) + (cell->fy >= y ? 9 : 0) + (cell->fz >= z ? 81 : 0)) * cell->stride;
+}
+
+INLINE float cell_trilinear(const VolumeCell *cell, int channel)
+{
+    const int s = cell->stride;
+    __global const float *c = cell->corner + channel;
+    const float c00 = lerp(c[0], c[s], cell->fx);
+    const float c10 = lerp(c[9 * s], c[10 * s], cell->fx);
+    const float c01 = lerp(c[81 * s], c[82 * s], cell->fx);
+    const float c11 = lerp(c[90 * s], c[91 * s], cell->fx);
+    return lerp(lerp(c00, c10, cell->fy), lerp(c01, c11, cell->fy), cell->fz);
+}
+
+INLINE bool volume_is_nearest(__global const Volume *volume)
+{
+    return CLVOL_HAS_NEAREST && (!CLVOL_HAS_TRILINEAR || volume->nearest);
+}
+
+INLINE float cell_value(const VolumeCell *cell, bool nearest, int channel)
+{
+    if (nearest)
+        return cell->corner[cell_corner(cell, 0.5f, 0.5f, 0.5f) + channel];
+    return cell_trilinear(cell, channel);
+}
+
+/* Value of one channel of `volume` at index position p; a grey volume serves every channel. */
+INLINE float volume_value(const Scene *scene, __global const Volume *volume, float3 p, int channel)
+{
+    const VolumeCell cell = volume_cell(scene, volume, p);
+    return cell_value(&cell, volume_is_nearest(volume), cell.stride > 1 ? channel : 0);
+}
+
+/* All channels at once. */
+INLINE float3 volume_value3(const Scene *scene, __global const Volume *volume, float3 p)
+{
+    const VolumeCell cell = volume_cell(scene, volume, p);
+    const bool nearest = volume_is_nearest(volume);
+    const float first = cell_value(&cell, nearest, 0);
+    if (cell.stride == 1)
+        return (float3)(first);
+    return (float3)(first, cell_value(&cell, nearest, 1), cell_value(&cell, nearest, 2));
+}
+
+/* Value as a path carries it. */
+INLINE Spectrum volume_spectrum(const Scene *scene, __global const Volume *volume, float3 p, int channel)
+{
+#if CLVOL_SPECTRUM == 3
+    return volume_value3(scene, volume, p);
+#else
+    return volume_value(scene, volume, p, channel);
+#endif
 }
 
 #endif

@@ -3,18 +3,6 @@
 #define CLVOL_EMITTER_H
 #include "core/sampling.h"
 
-/* An rgb value as the path carries it. */
-INLINE Spectrum to_spectrum(float3 rgb, uint channel)
-{
-#if CLVOL_SPECTRUM == 3
-    return rgb;
-#elif CLVOL_ONE_CHANNEL_PER_PATH
-    return channel == 0 ? rgb.x : (channel == 1 ? rgb.y : rgb.z);
-#else
-    return rgb.x;
-#endif
-}
-
 INLINE float3 emitter_value(__global const Emitter *emitter)
 {
     return (float3)(emitter->value[0], emitter->value[1], emitter->value[2]);

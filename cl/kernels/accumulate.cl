@@ -14,18 +14,21 @@ INLINE float2 add_exactly(float2 sum, float value)
     return (float2)(total, sum.y + lost);
 }
 
-__kernel void accumulate_kernel(__global const float *results, __global const uint *result_lookups,
-                                __global float *film, __global ulong *film_lookups, __global uint *control,
-                                uint ring_pass, uint pass_jobs, uint samples, uint pixels)
+__kernel void accumulate_kernel(__global const float *results, __global const uint *result_counts,
+                                __global float *film, __global ulong *film_counts, __global float *film_peaks,
+                                __global uint *control, uint ring_pass, uint pass_jobs, uint samples, uint pixels)
 {
     const uint pixel = get_global_id(0);
     if (pixel >= pixels)
         return;
     const size_t first = (size_t)ring_pass * pass_jobs + (size_t)pixel * samples;
-    ulong lookups = 0;
-    for (uint s = 0; s < samples; ++s)
-        lookups += result_lookups[first + s];
-    film_lookups[pixel] += lookups;
+    for (uint n = 0; n < CLVOL_PATH_COUNTS; ++n) {
+        ulong total = 0;
+        for (uint s = 0; s < samples; ++s)
+            total += result_counts[(first + s) * CLVOL_RESULT_COUNTS + n];
+        film_counts[(size_t)pixel * CLVOL_PATH_COUNTS + n] += total;
+    }
+    float peak = film_peaks[(size_t)pixel * CLVOL_PEAKS];
     for (uint c = 0; c < CLVOL_CHANNELS; ++c) {
         const size_t at = (size_t)pixel * CLVOL_CHANNELS + c;
         float4 f = vload4(at, film); /* sum, its error, sum of squares, its error */
@@ -34,10 +37,18 @@ __kernel void accumulate_kernel(__global const float *results, __global const ui
             if (!isfinite(x))
                 atomic_inc(control + CONTROL_NON_FINITE);
             const float square = x * x;
+            peak = max_of(peak, abs_of(x));
             f.xy = add_exactly(f.xy, x);
             f.zw = add_exactly(f.zw, square);
             f.w += fma(x, x, -square);
         }
         vstore4(f, at, film);
     }
+    film_peaks[(size_t)pixel * CLVOL_PEAKS] = peak;
+#if CLVOL_PEAKS > 1 /* the largest weight, the last of a result's numbers */
+    float weight = film_peaks[(size_t)pixel * CLVOL_PEAKS + 1];
+    for (uint s = 0; s < samples; ++s)
+        weight = max_of(weight, as_float(result_counts[(first + s) * CLVOL_RESULT_COUNTS + CLVOL_PATH_COUNTS]));
+    film_peaks[(size_t)pixel * CLVOL_PEAKS + 1] = weight;
+#endif
 }

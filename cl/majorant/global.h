@@ -1,34 +1,35 @@
-/* Majorant walks cut the stretch [0, t_max] of an index-space ray into segments [t, t_end] along which
-   one bound `majorant` of sigma_t holds (per world length).  Each header of this folder implements
+/* Majorant walks cut the stretch [0, t_max] of a MediumRay into segments [t, t_end] along which one bound
+   `majorant` of sigma_t holds (per world length).  Each header of this folder implements
 
-       MajorantWalk majorant_begin(scene, medium, ray, t_max);
-       bool majorant_next(scene, medium, &walk);       false when t_max is reached
+       MajorantWalk majorant_begin(medium_ray);
+       bool majorant_next(medium_ray, &walk);       false when t_max is reached
 
-   and the tracker decides what happens inside a segment.  Border cells reach out to infinity, like
-   the clamped look-ups they bound.
+   and sets `cell`, the segment's row in the medium's tables of controls; the tracker decides what
+   happens inside a segment.  Border cells reach out to infinity, like the clamped look-ups they bound.
 
    global: one bound for the whole medium, a single segment. */
 #ifndef CLVOL_MAJORANT_H
 #define CLVOL_MAJORANT_H
+#include "tracking/interface.h"
 
 typedef struct {
     float t;
     float t_end;
     float majorant;
-    float t_max;
+    int cell;
 } MajorantWalk;
 
-INLINE MajorantWalk majorant_begin(const Scene *scene, __global const Medium *medium, Ray ray, float t_max)
+INLINE MajorantWalk majorant_begin(const MediumRay *in)
 {
-    MajorantWalk walk = {0.0f, 0.0f, medium->majorant, t_max};
+    MajorantWalk walk = {0.0f, 0.0f, in->rate * in->medium->majorant, 0};
     return walk;
 }
 
-INLINE bool majorant_next(const Scene *scene, __global const Medium *medium, MajorantWalk *walk)
+INLINE bool majorant_next(const MediumRay *in, MajorantWalk *walk)
 {
     walk->t = walk->t_end;
-    walk->t_end = walk->t_max;
-    return walk->t < walk->t_max;
+    walk->t_end = in->t_max;
+    return walk->t < in->t_max;
 }
 
 #endif

@@ -18,7 +18,7 @@ INLINE void write_result(const Scene *scene, uint slot, uint job)
 #else
     vstore3(radiance, place, scene->results);
 #endif
-    scene->result_lookups[place] = path_lookups(scene, slot);
+    write_counts(scene, slot, place);
     atomic_inc(scene->control + CONTROL_DONE + place / scene->render->pass_jobs);
 }
 
@@ -82,7 +82,7 @@ INLINE void start_job(const Scene *scene, uint slot, uint job)
     set_path_sample(scene, slot, key.sample);
     set_path_job(scene, slot, job);
     set_path_bounce(scene, slot, 0);
-    set_path_lookups(scene, slot, 0);
+    reset_counts(scene, slot);
 #if CLVOL_MIS
     set_path_pdf(scene, slot, 0.0f);
 #endif

@@ -1,6 +1,19 @@
 /* Walks one interval of one medium to a collision or to the interval's end. */
 #ifndef CLVOL_STAGES_MEDIUM_SAMPLE_H
 #define CLVOL_STAGES_MEDIUM_SAMPLE_H
+#include "stages/medium_ray.h"
+
+INLINE bool medium_collision(const MediumRay *in, uint4 k, Tally *tally, Collision *collision)
+{
+    Stream stream = stream_begin(k.z, k.w);
+#if CLVOL_HAS_HOMOGENEOUS
+    if (is_homogeneous(in->medium))
+        return homogeneous_collision(in, k.x, &stream, tally, collision);
+#endif
+#if CLVOL_HAS_HETEROGENEOUS
+    return sample_collision(in, k.x, &stream, tally, collision);
+#endif
+}
 
 INLINE void medium_sample(const Scene *scene, uint group, uint slot)
 {
@@ -17,22 +30,23 @@ INLINE void medium_sample(const Scene *scene, uint group, uint slot)
     Ray ray = path_ray(scene, slot);
     ray.o += start * ray.d;
     const float t_max = path_interval_end(scene, slot) - start;
+    const MediumRay in = medium_ray(scene, medium, ray, t_max, (int)path_channel_or_zero(scene, slot));
     const uint4 k = decision_block(render_seed(scene), key, BLOCK_WALK, interval);
+    Tally tally = {0, 0, 0, 0, 0, 0, 0.0f};
     Collision collision;
-    collision.channel = (int)path_channel_or_zero(scene, slot);
-    bool collided = false;
-#if CLVOL_HAS_HOMOGENEOUS
-    if (!CLVOL_HAS_HETEROGENEOUS || medium->homogeneous)
-        collided = homogeneous_collision(medium->sigma_t[collision.channel], t_max, k.x, &collision);
+#if CLVOL_WEIGHTED || CLVOL_EMISSION_ON_WALKS
+    collision.beta = get_beta(scene, slot);
+    collision.emission = (Spectrum)(0.0f);
 #endif
-#if CLVOL_HAS_HETEROGENEOUS
-    if (!CLVOL_HAS_HOMOGENEOUS || !medium->homogeneous) {
-        Stream stream = stream_begin(k.z, k.w);
-        Tally tally = {0, 0, 0};
-        const Ray index_ray = transform_ray(scene->volumes[medium->sigma_t_volume].world_to_index, ray);
-        collided = sample_collision(scene, medium, index_ray, t_max, k.x, &stream, &tally, &collision);
-        record_tally(scene, slot, tally);
-    }
+    const bool collided = medium_collision(&in, k, &tally, &collision);
+    record_tally(scene, slot, tally);
+#if CLVOL_EMISSION_ON_WALKS
+    if (!CLVOL_HAS_MAX_DEPTH || scene->render->max_depth > 0)
+        set_radiance(scene, slot, get_radiance(scene, slot) + collision.emission);
+#endif
+#if CLVOL_WEIGHTED
+    set_beta(scene, slot, collision.beta);
+    record_weight(scene, slot, max_of(tally.weight, spectrum_max(collision.beta)));
 #endif
 #if CLVOL_HAS_OVERLAP
     if (collided) {

@@ -4,6 +4,7 @@
    wait for each other.  A queue holds slot numbers; its order is not defined and nothing depends on it. */
 #ifndef CLVOL_STAGES_PATH_H
 #define CLVOL_STAGES_PATH_H
+#include "tracking/tally.h"
 
 #define NO_JOB 0xFFFFFFFFu
 
@@ -86,21 +87,27 @@ INLINE uint path_channel_or_zero(const Scene *scene, uint slot)
 #endif
 }
 
-#if CLVOL_HAS_HETEROGENEOUS
+#if CLVOL_HAS_MEDIA
 INLINE void record_tally(const Scene *scene, uint slot, Tally tally)
 {
     set_path_lookups(scene, slot, path_lookups(scene, slot) + tally.lookups);
+    set_path_tentative(scene, slot, path_tentative(scene, slot) + tally.tentative);
+    set_path_real(scene, slot, path_real(scene, slot) + tally.real);
+#if CLVOL_HAS_HETEROGENEOUS
+    set_path_cells(scene, slot, path_cells(scene, slot) + tally.cells);
     if (tally.violations > 0)
         set_path_violations(scene, slot, path_violations(scene, slot) + tally.violations);
     if (tally.exhausted > 0)
         set_path_exhausted(scene, slot, path_exhausted(scene, slot) + tally.exhausted);
+#endif
+}
+
+INLINE void record_weight(const Scene *scene, uint slot, float weight)
+{
+    if (weight > path_largest_weight(scene, slot))
+        set_path_largest_weight(scene, slot, weight);
 }
 #endif
-
-INLINE float3 load_vector(__global const float *v)
-{
-    return (float3)(v[0], v[1], v[2]);
-}
 
 #if CLVOL_SPECTRUM == 1
 #define CLVOL_SPECTRUM_FIELD(name) \

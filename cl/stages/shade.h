@@ -5,6 +5,7 @@
    (METHODS §6). */
 #ifndef CLVOL_STAGES_SHADE_H
 #define CLVOL_STAGES_SHADE_H
+#include "tracking/probability.h"
 
 /* Share of a path's first weight below which absorption is sampled (absorption "mixed").  On cloud.xml, with
    next-event estimation, 1/2 was 1.4 times as efficient as never sampling it and 1.9 times as always. */
@@ -21,7 +22,7 @@ INLINE void shade_escape(const Scene *scene, uint slot)
 #endif
     float light_pdf;
     const float3 rgb = environment(scene, path_ray(scene, slot).d, &light_pdf);
-    Spectrum radiance = get_beta(scene, slot) * to_spectrum(rgb, path_channel_or_zero(scene, slot));
+    Spectrum radiance = get_beta(scene, slot) * to_spectrum(rgb, (int)path_channel_or_zero(scene, slot));
 #if CLVOL_MIS
     const float pdf = path_pdf(scene, slot);
     if (pdf > 0.0f)
@@ -31,35 +32,22 @@ INLINE void shade_escape(const Scene *scene, uint slot)
 #endif
 }
 
-/* Single-scattering albedo of `medium` at world point p. */
-INLINE Spectrum medium_albedo(const Scene *scene, uint slot, __global const Medium *medium, float3 p)
-{
-    const uint channel = path_channel_or_zero(scene, slot);
-#if CLVOL_HAS_ALBEDO_VOLUME
-    if (medium->albedo_volume >= 0) {
-        __global const Volume *volume = scene->volumes + medium->albedo_volume;
-        const float3 at = transform_point(volume->world_to_index, p);
-        if (volume->channels == 1)
-            return (Spectrum)(volume_value(scene, volume, at, 0));
-#if CLVOL_SPECTRUM == 3
-        return (Spectrum)(volume_value(scene, volume, at, 0), volume_value(scene, volume, at, 1),
-                          volume_value(scene, volume, at, 2));
-#else
-        return volume_value(scene, volume, at, (int)channel);
-#endif
-    }
-#endif
-    return to_spectrum((float3)(medium->albedo[0], medium->albedo[1], medium->albedo[2]), channel);
-}
-
 #if CLVOL_HAS_SCATTERING
 /* Absorption at a collision (METHODS §2): by event, by weight, or by weight as long as the path's weight
-   is worth following and by event below.  Each multiplies the expected weight by the albedo. */
+   is worth following and by event below.  Each multiplies the expected weight by the albedo.  By event, a path
+   of several channels chooses between scattering and absorption as it does between events of its walk. */
 INLINE bool survives_absorption(const Scene *scene, SampleKey key, uint interval, Spectrum albedo, Spectrum *beta)
 {
     float survival = 1.0f;
     if (CLVOL_ABSORPTION == ABSORPTION_SAMPLE) {
-        survival = spectrum_max(albedo); /* the same for every channel the path carries */
+#if CLVOL_SPECTRUM == 3
+        const float scatters = spectral_rate(*beta, albedo), absorbed = spectral_rate(*beta, 1.0f - albedo);
+        survival = scatters > 0.0f ? scatters / (scatters + absorbed) : 0.0f;
+        if (survival > 0.0f)
+            *beta *= albedo / survival;
+#else
+        survival = albedo;
+#endif
     } else {
         *beta *= albedo;
         const float weight = spectrum_max(*beta);
@@ -88,9 +76,9 @@ INLINE void next_event(const Scene *scene, uint group, uint slot, SampleKey key,
     const uint4 k = decision_block(render_seed(scene), key, BLOCK_LIGHT, 0);
     const LightSample light =
         sample_light(scene, p, uniform_below_one(k.x), uniform_below_one(k.y), uniform_below_one(k.z));
-    const float pdf = phase_pdf(medium, wo, light.direction);
+    const float pdf = phase_pdf(scene, medium, wo, light.direction);
     const float weight = light.pdf > 0.0f ? mis_weight(light.pdf, pdf) : 1.0f;
-    const Spectrum value = beta * to_spectrum(light.value, path_channel_or_zero(scene, slot)) * (pdf * weight);
+    const Spectrum value = beta * to_spectrum(light.value, (int)path_channel_or_zero(scene, slot)) * (pdf * weight);
     if (!(spectrum_max(value) > 0.0f))
         return;
     set_path_shadow_x(scene, slot, light.direction.x);
@@ -127,14 +115,14 @@ INLINE bool scatter(const Scene *scene, uint group, uint slot, SampleKey key, __
         beta /= survival;
     }
     float pdf;
-    const float3 wi = phase_sample(medium, ray.d, uniform_below_one(k.x), uniform_below_one(k.y), &pdf);
+    const float3 wi = phase_sample(scene, medium, ray.d, uniform_below_one(k.x), uniform_below_one(k.y),
+                                   uniform_float(k.w), &pdf);
 #if CLVOL_MIS
     set_path_pdf(scene, slot, medium->sample_emitters ? pdf : 0.0f);
 #endif
     set_path_direction(scene, slot, wi);
     set_beta(scene, slot, beta);
-    if (spectrum_max(beta) > path_largest_weight(scene, slot))
-        set_path_largest_weight(scene, slot, spectrum_max(beta));
+    record_weight(scene, slot, spectrum_max(beta));
 #if CLVOL_HAS_MANY_MEDIA
     set_path_interval(scene, slot, 0);
 #endif
@@ -145,11 +133,10 @@ INLINE bool scatter(const Scene *scene, uint group, uint slot, SampleKey key, __
 }
 #endif
 
+#if CLVOL_HAS_MEDIA
 /* Returns false when the path ends at the collision. */
 INLINE bool shade_collision(const Scene *scene, uint group, uint slot)
 {
-#if CLVOL_HAS_SCATTERING
-    const SampleKey key = path_key(scene, slot);
 #if CLVOL_HAS_MANY_MEDIA
     __global const Medium *medium = scene->media + path_medium(scene, slot);
     const uint interval = path_interval(scene, slot);
@@ -157,15 +144,23 @@ INLINE bool shade_collision(const Scene *scene, uint group, uint slot)
     __global const Medium *medium = scene->media;
     const uint interval = 0;
 #endif
-    const Spectrum albedo = medium_albedo(scene, slot, medium, path_ray(scene, slot).o);
+    const float3 p = path_ray(scene, slot).o;
+    const int channel = (int)path_channel_or_zero(scene, slot);
     Spectrum beta = get_beta(scene, slot);
-    if (!survives_absorption(scene, key, interval, albedo, &beta))
+#if CLVOL_EMISSION_AT_COLLISIONS /* of overlapping media: their walks do not know which collision counts */
+    if (!CLVOL_HAS_MAX_DEPTH || scene->render->max_depth > 0)
+        set_radiance(scene, slot, get_radiance(scene, slot) + beta * medium_source(scene, medium, p, channel));
+#endif
+#if CLVOL_HAS_SCATTERING
+    const SampleKey key = path_key(scene, slot);
+    if (!survives_absorption(scene, key, interval, medium_albedo(scene, medium, p, channel), &beta))
         return false;
     return scatter(scene, group, slot, key, medium, beta);
 #else
     return false;
 #endif
 }
+#endif
 
 INLINE void shade(const Scene *scene, uint group, uint slot)
 {

@@ -1,18 +1,17 @@
 /* Attenuates one next-event ray by every medium on its way and adds what arrives. */
 #ifndef CLVOL_STAGES_SHADOW_TRANSMITTANCE_H
 #define CLVOL_STAGES_SHADOW_TRANSMITTANCE_H
+#include "stages/medium_ray.h"
 
-INLINE float medium_transmittance(const Scene *scene, __global const Medium *medium, Ray ray, float t_max,
-                                         int channel, uint4 k, Tally *tally)
+INLINE Extinction medium_transmittance(const MediumRay *in, uint4 k, Tally *tally)
 {
 #if CLVOL_HAS_HOMOGENEOUS
-    if (!CLVOL_HAS_HETEROGENEOUS || medium->homogeneous)
-        return homogeneous_transmittance(medium->sigma_t[channel], t_max);
+    if (is_homogeneous(in->medium))
+        return homogeneous_transmittance(in);
 #endif
 #if CLVOL_HAS_HETEROGENEOUS
     Stream stream = stream_begin(k.z, k.w);
-    const Ray index_ray = transform_ray(scene->volumes[medium->sigma_t_volume].world_to_index, ray);
-    return estimate_transmittance(scene, medium, index_ray, t_max, channel, k.x, &stream, tally);
+    return estimate_transmittance(in, k.x, &stream, tally);
 #endif
 }
 
@@ -28,8 +27,8 @@ INLINE void shadow_transmittance(const Scene *scene, uint group, uint slot)
     const float limit = INFINITY;
 #endif
     const int channel = (int)path_channel_or_zero(scene, slot);
-    float transmittance = 1.0f;
-    Tally tally = {0, 0, 0};
+    Extinction transmittance = (Extinction)(1.0f);
+    Tally tally = {0, 0, 0, 0, 0, 0, 0.0f};
     for (uint m = 0; m < (CLVOL_HAS_MANY_MEDIA ? scene->render->media : 1u); ++m) {
         __global const Medium *medium = scene->media + m;
         float t0 = 0.0f, t1 = limit;
@@ -39,13 +38,12 @@ INLINE void shadow_transmittance(const Scene *scene, uint group, uint slot)
         const uint4 k = decision_block(render_seed(scene), key, BLOCK_SHADOW, m);
         Ray inside = ray;
         inside.o += t0 * ray.d;
-        transmittance *= medium_transmittance(scene, medium, inside, t1 - t0, channel, k, &tally);
-        if (transmittance == 0.0f)
+        const MediumRay in = medium_ray(scene, medium, inside, t1 - t0, channel);
+        transmittance *= medium_transmittance(&in, k, &tally);
+        if (extinction_max(transmittance) == 0.0f)
             break;
     }
-#if CLVOL_HAS_HETEROGENEOUS
     record_tally(scene, slot, tally);
-#endif
     set_radiance(scene, slot, get_radiance(scene, slot) + get_shadow(scene, slot) * transmittance);
 }
 

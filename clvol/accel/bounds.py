@@ -1,12 +1,13 @@
 """Bounds of a field over the cells of a lattice: the raw material of every majorant.
 
-Arrays are indexed [z, y, x].  A cell's bounds hold for every interpolated value in the closed cell,
-and, by the slack below, for look-ups that rounding puts just outside it.
+Arrays are indexed [z, y, x, channel].  A cell's bounds hold for every interpolated value in the closed
+cell, and, by the slack below, for look-ups that rounding puts just outside it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -18,21 +19,45 @@ _ROUNDING = np.float32(1 + 2.0**-20)
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """Extrema per cell, float32 (nz, ny, nx), and the cell's edge in index units."""
+    """Extrema, and where they are wanted means, per cell and channel: float32 (nz, ny, nx, channels).
+
+    cell_size : the cell's edge in index units.
+    """
 
     minimum: np.ndarray
     maximum: np.ndarray
     cell_size: float
+    mean: np.ndarray | None = None
 
     @property
     def cells(self) -> tuple[int, int, int]:
         """Cells per axis, x y z."""
-        nz, ny, nx = self.maximum.shape
+        nz, ny, nx = self.maximum.shape[:3]
         return nx, ny, nz
 
+    @property
+    def majorant(self) -> np.ndarray:
+        """The one bound that all channels share, (nz, ny, nx)."""
+        return over_channels(self.maximum, np.maximum)
+
     def coarser(self) -> Bounds:
-        """The same bounds over cells of twice the edge."""
-        return Bounds(_merge(self.minimum, np.minimum), _merge(self.maximum, np.maximum), 2 * self.cell_size)
+        """The same over cells of twice the edge; in a mean every cell that it merges counts the same."""
+        mean = None if self.mean is None else _merged_mean(self.mean)
+        low, high = _merge(self.minimum, np.minimum), _merge(self.maximum, np.maximum)
+        return Bounds(low, high, 2 * self.cell_size, mean)
+
+    def whole(self) -> Bounds:
+        """The same over a single cell that holds all."""
+        low, high = self.minimum.min(axis=(0, 1, 2)), self.maximum.max(axis=(0, 1, 2))
+        mean = None
+        if self.mean is not None:
+            mean = self.mean.mean(axis=(0, 1, 2), dtype=np.float64).astype(np.float32)[None, None, None]
+        return Bounds(low[None, None, None], high[None, None, None], max(self.cells) * self.cell_size, mean)
+
+
+def over_channels(values: np.ndarray, combine: np.ufunc) -> np.ndarray:
+    """Channels combined into one number, (..., channels) to (...); a view where there is but one."""
+    return reduce(combine, np.moveaxis(values, -1, 0))
 
 
 def _merge(values: np.ndarray, combine: np.ufunc) -> np.ndarray:
@@ -42,23 +67,31 @@ def _merge(values: np.ndarray, combine: np.ufunc) -> np.ndarray:
     return values
 
 
-def with_slack(minimum: np.ndarray, maximum: np.ndarray, cell_size: float) -> Bounds:
-    """Bounds that also hold `SLACK` of a voxel beyond each cell, and after rounding.
+def _merged_mean(values: np.ndarray) -> np.ndarray:
+    ones = np.ones((*values.shape[:3], 1), np.float64)
+    return (_merge(values.astype(np.float64), np.add) / _merge(ones, np.add)).astype(np.float32)
+
+
+def with_slack(
+    minimum: np.ndarray, maximum: np.ndarray, cell_size: float, mean: np.ndarray | None = None
+) -> Bounds:
+    """Bounds that also hold `SLACK` of a voxel beyond each cell, and after rounding; `mean` as it is.
 
     The field changes by at most (neighbour's extremum - own) over one voxel into the neighbour.
-    A cell that is exactly 0 stays 0, so that empty space is skipped.
+    A cell that is exactly 0 in every channel stays 0, so that empty space is skipped.
     """
     high = maximum + SLACK * (_neighbourhood(maximum, np.maximum) - maximum)
     low = minimum + SLACK * (_neighbourhood(minimum, np.minimum) - minimum)
-    high = np.where(maximum > 0, high * _ROUNDING, np.float32(0)).astype(np.float32)
+    holds_matter = over_channels(maximum, np.maximum)[..., None] > 0
+    high = np.where(holds_matter, high * _ROUNDING, np.float32(0)).astype(np.float32)
     low = np.maximum(low / _ROUNDING, np.float32(0)).astype(np.float32)
-    return Bounds(low, high, cell_size)
+    return Bounds(low, high, cell_size, mean)
 
 
 def _neighbourhood(values: np.ndarray, combine: np.ufunc) -> np.ndarray:
     """Extremum over each cell and its 26 neighbours."""
     for axis in range(3):
-        wide = np.pad(values, [(1, 1) if a == axis else (0, 0) for a in range(3)], mode="edge")
+        wide = np.pad(values, [(1, 1) if a == axis else (0, 0) for a in range(values.ndim)], mode="edge")
         n = values.shape[axis]
         parts = [np.take(wide, range(k, k + n), axis=axis) for k in range(3)]
         values = combine(combine(parts[0], parts[1]), parts[2])

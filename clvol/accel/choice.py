@@ -1,8 +1,9 @@
 """Which majorant a medium gets: the expected cost of a ray through it, in look-ups, decides.
 
 By integral geometry a random line through a convex body has mean chord 4V/A and meets a part of
-surface a with probability a/A.  All costs below are therefore volume × bound for look-ups plus a
-quarter of the surface for visits, and may be compared with each other.
+surface a with probability a/A.  All costs below are therefore volume × looseness (the bound less the
+control that a technique subtracts from it) for look-ups plus a quarter of the surface for visits, and may
+be compared with each other.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from clvol.accel.bounds import Bounds
+from clvol.accel.controls import Control, looseness
 
 CELL_COST = 0.055
 """Crossing a grid cell, in look-ups: fitted to the seconds of camera rays through scenes/cloud.xml over
@@ -20,25 +22,37 @@ STEP_COST = 0.08
 tree was walked fastest."""
 
 
-def global_cost(bounds: Bounds, extent: np.ndarray, rate: float) -> float:
-    """Expected cost of one bound for everything."""
-    return float(np.prod(np.array(bounds.cells) * extent)) * rate * float(bounds.maximum.max())
+def global_cost(
+    bounds: Bounds, extent: np.ndarray, rate: float, control: Control = "none", majorant_scale: float = 1.0
+) -> float:
+    """Expected cost of one bound for everything.
+
+    extent : float64 (3,), world lengths of a cell of `bounds` along x, y, z.
+    rate : look-ups per world length and unit of the bound: the medium's largest scale.
+    control, majorant_scale : what the technique subtracts (clvol.accel.controls).
+    """
+    loose = float(looseness(bounds.whole(), control, majorant_scale)[0, 0, 0])
+    return float(np.prod(np.array(bounds.cells) * extent)) * rate * loose
 
 
-def grid_cost(bounds: Bounds, extent: np.ndarray, rate: float) -> float:
+def grid_cost(
+    bounds: Bounds, extent: np.ndarray, rate: float, control: Control = "none", majorant_scale: float = 1.0
+) -> float:
     """Expected cost of a grid: its look-ups, and half the surface of every cell (each face is shared)."""
-    volume = float(np.prod(extent))
+    loose = looseness(bounds, control, majorant_scale)
     a, b, c = extent
-    crossings = bounds.maximum.size * 0.5 * (a * b + b * c + c * a)
-    return volume * rate * float(bounds.maximum.sum(dtype=np.float64)) + CELL_COST * crossings
+    crossings = loose.size * 0.5 * (a * b + b * c + c * a)
+    return float(np.prod(extent)) * rate * float(loose.sum(dtype=np.float64)) + CELL_COST * crossings
 
 
-def best_grid(bounds: Bounds, extent: np.ndarray, rate: float) -> tuple[Bounds, float]:
+def best_grid(
+    bounds: Bounds, extent: np.ndarray, rate: float, control: Control = "none", majorant_scale: float = 1.0
+) -> tuple[Bounds, float]:
     """The cheapest grid among `bounds` and its successive doublings, and its cost."""
-    best, best_cost = bounds, grid_cost(bounds, extent, rate)
+    best, best_cost = bounds, grid_cost(bounds, extent, rate, control, majorant_scale)
     while max(bounds.cells) > 1:
         bounds, extent = bounds.coarser(), extent * 2
-        cost = grid_cost(bounds, extent, rate)
+        cost = grid_cost(bounds, extent, rate, control, majorant_scale)
         if cost < best_cost:
             best, best_cost = bounds, cost
     return best, best_cost

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from clvol.errors import SceneError
-from clvol.scene.nodes import Node
+from clvol.scene.nodes import MAX_DEPTH, Node
 from clvol.scene.reader import Reader
 from clvol.scene.vocabulary import LATER, did_you_mean, join_hints, listed
 from clvol.volumes.grid import Grid
@@ -34,8 +34,10 @@ class Builder:
     def __init__(self, root: Node, plugins: PluginTable) -> None:
         self.plugins = plugins
         self.grids: dict[tuple[Path, str | None], Grid] = {}
+        self.reduced: dict[int, Any] = {}  # by id() of a grid or volume that `grids` or a record keeps alive
         self._ids: dict[str, Node] = {}
         self._built: dict[int, Any] = {}
+        self._open: list[Node] = []
         self._collect_ids(root)
 
     def _collect_ids(self, node: Node) -> None:
@@ -102,8 +104,12 @@ class Builder:
         """The record of a node; the same object each time, so that what is shared stays shared."""
         if id(node) not in self._built:
             self.check_supported(node)
+            if any(node is outer for outer in self._open) or len(self._open) > MAX_DEPTH:
+                raise SceneError(f"'{node.type}' is nested without end", node.where)
+            self._open.append(node)
             reader = Reader(node, self)
             record = self.plugins[reader.kind][node.type](reader)
             reader.finish()
+            self._open.pop()
             self._built[id(node)] = record
         return self._built[id(node)]

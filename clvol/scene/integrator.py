@@ -5,7 +5,7 @@ from __future__ import annotations
 from clvol.scene.reader import Reader
 from clvol.scene.records import Integrator
 
-CHOICES = ("technique", "transmittance", "majorant", "lookup", "absorption")
+CHOICES = ("technique", "transmittance", "majorant", "lookup", "absorption", "probability", "control")
 """Parameters handed on as strings; what they may say is for the registry of techniques to judge."""
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from clvol.errors import SceneError
-from clvol.scene import emitter, integrator, medium, sensor, shape, volume
+from clvol.scene import emitter, integrator, medium, phase, sensor, shape, volume
 from clvol.scene.builder import Builder, PluginTable
 from clvol.scene.nodes import Node, from_dict
 from clvol.scene.records import ConstantEmitter, EnvmapEmitter, Integrator, Scene
@@ -26,7 +26,12 @@ PLUGINS: PluginTable = {
         "constvolume": volume.constvolume,
         "vdbvolume": volume.vdbvolume,
     },
-    "phase": {"isotropic": medium.isotropic, "hg": medium.hg},
+    "phase": {
+        "isotropic": phase.isotropic,
+        "hg": phase.hg,
+        "rayleigh": phase.rayleigh,
+        "blendphase": phase.blendphase,
+    },
     "emitter": {
         "constant": emitter.constant,
         "envmap": emitter.envmap,

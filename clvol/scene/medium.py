@@ -1,13 +1,16 @@
-"""Participating media and their phase functions."""
+"""Participating media: extinction, albedo and emission, each a number, a colour or a volume."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
 from clvol.scene.reader import Reader
-from clvol.scene.records import ConstVolume, GridVolume, Medium, Phase, Volume
-from clvol.scene.volume import largest_value
-from clvol.volumes import check_coefficients
+from clvol.scene.records import ConstVolume, GridVolume, Medium, Phase, Spectrum, Volume
+from clvol.scene.volume import channels_of, largest_value
+from clvol.volumes import check_coefficients, check_finite
+from clvol.volumes.proportional import proportional_channels
 
 
 def homogeneous(reader: Reader) -> Medium:
@@ -21,16 +24,9 @@ def heterogeneous(reader: Reader) -> Medium:
 
 
 def _medium(reader: Reader, homogeneous: bool) -> Medium:
-    sigma_t = _coefficient(reader, "sigma_t", 1.0)
-    if homogeneous and isinstance(sigma_t, GridVolume):
-        reader.fail(
-            "a homogeneous medium cannot have a grid as sigma_t", "sigma_t", "use the heterogeneous plugin"
-        )
+    sigma_t, scale = _extinction(reader, homogeneous)
     albedo = _coefficient(reader, "albedo", 0.75, maximum=1.0)
-    scale = reader.number("scale", 1.0, minimum=0.0)
     sample_emitters = reader.boolean("sample_emitters", True)
-    for name in ("emission", "emission_scale", "temperature", "temperature_scale", "temperature_offset"):
-        reader.refuse(name)
     reader.ignore("has_spectral_extinction")
     phase = reader.only_child("phase")
     return Medium(
@@ -40,19 +36,54 @@ def _medium(reader: Reader, homogeneous: bool) -> Medium:
         reader.build.build(phase) if phase else Phase(),
         homogeneous,
         sample_emitters,
+        **_emission(reader),
         name=reader.node.id,
     )
 
 
-def _coefficient(reader: Reader, name: str, default: float, maximum: float = np.inf) -> Volume:
+def _extinction(reader: Reader, homogeneous: bool) -> tuple[Volume, Spectrum]:
+    """`sigma_t` and `scale`, with the factors of a coloured grid that is a grey one times a colour."""
+    sigma_t = _coefficient(reader, "sigma_t", 1.0)
+    scale = reader.color("scale", 1.0)
+    if not isinstance(sigma_t, GridVolume):
+        return sigma_t, scale
+    if homogeneous:
+        reader.fail(
+            "a homogeneous medium cannot have a grid as sigma_t", "sigma_t", "use the heterogeneous plugin"
+        )
+    if channels_of(sigma_t) == 1:
+        return sigma_t, scale
+    if len(scale) > 1:
+        reader.fail(
+            "a coloured scale needs a sigma_t of one channel, this grid has three",
+            "scale",
+            "give a number as scale, or a grid of one channel",
+        )
+    sigma_t, factors = _reduced(reader, sigma_t)
+    return sigma_t, tuple(scale[0] * factor for factor in factors)
+
+
+def _reduced(reader: Reader, volume: GridVolume) -> tuple[GridVolume, Spectrum]:
+    """The volume in one channel and its colour where its channels are proportional, so that one look-up
+    serves all; else as it is.  What media share stays shared."""
+    done = reader.build.reduced
+    if id(volume.grid) not in done:
+        done[id(volume.grid)] = proportional_channels(volume.grid)
+    if done[id(volume.grid)] is None:
+        return volume, (1.0,)
+    grid, factors = done[id(volume.grid)]
+    if id(volume) not in done:
+        done[id(volume)] = replace(volume, grid=grid)
+    return done[id(volume)], factors
+
+
+def _coefficient(
+    reader: Reader, name: str, default: float, maximum: float = np.inf, light: bool = False
+) -> Volume:
     """Parameter `name`, a number, a colour or a volume, with values in [0, maximum]."""
     if reader.is_value(name):
-        return ConstVolume(reader.color(name, default, maximum=maximum))
-    reader.has(name)
-    found = reader.children("volume", name)
-    if not found:
-        reader.refuse_plugin(name, "a number, a colour or a volume")
-    volume = reader.build.build(found[0][1])
+        return ConstVolume(reader.color(name, default, light, maximum))
+    volume = _volume(reader, name, "a number, a colour or a volume")
     if isinstance(volume, GridVolume):
         check_coefficients(volume.grid, f"{name} of medium '{reader.type}'")
     if np.isfinite(maximum) and largest_value(volume) > maximum:
@@ -61,11 +92,43 @@ def _coefficient(reader: Reader, name: str, default: float, maximum: float = np.
     return volume
 
 
-def isotropic(reader: Reader) -> Phase:
-    """The `isotropic` phase function."""
-    return Phase()
+def _volume(reader: Reader, name: str, expected: str) -> Volume:
+    reader.has(name)
+    found = reader.children("volume", name)
+    if not found:
+        reader.refuse_plugin(name, expected)
+    return reader.build.build(found[0][1])
 
 
-def hg(reader: Reader) -> Phase:
-    """The Henyey-Greenstein phase function of mean cosine `g`, -1 < g < 1."""
-    return Phase("hg", reader.number("g", 0.8, minimum=-1.0, maximum=1.0, open_interval=True))
+def _emission(reader: Reader) -> dict[str, object]:
+    """The fields of a Medium that say what it emits.  A spectrum is seen as that of a light."""
+    fields: dict[str, object] = {}
+    if reader.has("emission"):
+        fields["emission"] = _coefficient(reader, "emission", 1.0, light=True)
+    if reader.has("temperature"):
+        fields["temperature"] = _temperature(reader)
+        fields["temperature_scale"] = reader.number("temperature_scale", 1.0)
+        fields["temperature_offset"] = reader.number("temperature_offset", 0.0)
+    if fields:
+        fields["emission_scale"] = reader.number("emission_scale", 1.0, minimum=0.0)
+    needs = {"emission_scale": "an emission or a temperature"}
+    needs |= dict.fromkeys(("temperature_scale", "temperature_offset"), "a temperature")
+    for name, what in needs.items():
+        if reader.has(name) and name not in fields:
+            reader.fail(
+                f"'{name}' of medium '{reader.type}' has nothing to scale", name, f"give the medium {what}"
+            )
+    return fields
+
+
+def _temperature(reader: Reader) -> Volume:
+    """`temperature`, a number or a volume of one channel; any finite values."""
+    name, expected = "temperature", "a number or a volume of one channel"
+    if reader.is_value(name):
+        return ConstVolume((reader.number(name, 0.0),))
+    volume = _volume(reader, name, expected)
+    if channels_of(volume) > 1:
+        reader.fail(f"'{name}' of medium '{reader.type}' must be {expected}, this one has three", name)
+    if isinstance(volume, GridVolume):
+        check_finite(volume.grid, f"{name} of medium '{reader.type}'")
+    return volume

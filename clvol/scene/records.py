@@ -7,6 +7,7 @@ vectors from local to world space (``world = M @ local``).
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,6 +16,14 @@ from clvol.volumes.grid import Grid
 
 Spectrum = tuple[float, ...]
 """One number (grey) or three (linear sRGB)."""
+
+
+def as_spectrum(value: float | Iterable[float]) -> Spectrum:
+    """A number or one or three numbers as a Spectrum; three equal ones stay three."""
+    components = np.asarray(value, dtype=np.float64).reshape(-1)
+    if components.size not in (1, 3):
+        raise ValueError(f"a spectrum has one or three components, got {components.size}")
+    return tuple(components.tolist())
 
 
 @dataclass(frozen=True)
@@ -84,10 +93,22 @@ Volume = ConstVolume | GridVolume
 
 @dataclass(frozen=True)
 class Phase:
-    """Phase function: "isotropic", or "hg" (Henyey–Greenstein) with mean cosine g."""
+    """Phase function: "isotropic", "rayleigh", or "hg" (Henyey–Greenstein) with mean cosine g."""
 
     kind: str = "isotropic"
     g: float = 0.0
+
+
+@dataclass(frozen=True)
+class BlendPhase:
+    """Mixture of two phase functions; `weight` in [0, 1] is the share of the second."""
+
+    weight: float
+    first: PhaseFunction
+    second: PhaseFunction
+
+
+PhaseFunction = Phase | BlendPhase
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,16 +116,40 @@ class Medium:
     """Participating medium: sigma_t(x) = scale · sigma_t volume, sigma_s = albedo · sigma_t.
 
     A `homogeneous` medium fills its shape; a heterogeneous one is clipped to the box of its
-    sigma_t volume as well.
+    sigma_t volume as well.  `scale` may be given as one number.
+
+    It emits sigma_a · L_e per length, where L_e = emission_scale · emission · blackbody(kelvin), without the
+    factor that is None (both: no emission at all), and kelvin = (temperature − temperature_offset) ·
+    temperature_scale.  The blackbody is `clvol.blackbody.blackbody_rgb`: of luminance 1, and 0 where
+    kelvin <= 0.
     """
 
     sigma_t: Volume
     albedo: Volume
-    scale: float = 1.0
-    phase: Phase = Phase()
+    scale: Spectrum = (1.0,)
+    phase: PhaseFunction = Phase()
     homogeneous: bool = True
     sample_emitters: bool = True
+    emission: Volume | None = None
+    temperature: Volume | None = None  # one channel
+    emission_scale: float = 1.0
+    temperature_scale: float = 1.0
+    temperature_offset: float = 0.0
     name: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "scale", as_spectrum(self.scale))
+
+    @property
+    def emits(self) -> bool:
+        """Whether its L_e is anything but 0 everywhere, as far as can be told without reading grids."""
+        if not self.emission_scale or (self.emission is None and self.temperature is None):
+            return False
+        if isinstance(self.emission, ConstVolume) and not any(self.emission.value):
+            return False
+        if isinstance(self.temperature, ConstVolume):
+            return (self.temperature.value[0] - self.temperature_offset) * self.temperature_scale > 0
+        return True
 
 
 @dataclass(frozen=True, eq=False)

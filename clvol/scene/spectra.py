@@ -5,6 +5,8 @@ Tables: CIE 015:2018 (observer in 5 nm steps, D65 in 10 nm steps, both from 360 
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 _X = """
@@ -57,6 +59,14 @@ def _sampled(text: str, step: float, wavelengths: np.ndarray) -> np.ndarray:
     return np.interp(wavelengths, FIRST_NM + step * np.arange(len(values)), values, right=0.0)
 
 
+@cache
+def observer() -> tuple[np.ndarray, np.ndarray]:
+    """Wavelengths in nm, float64 (n,), and the weights (3, n) that turn a spectrum there into XYZ."""
+    at = np.linspace(FIRST_NM, LAST_NM, 1000)
+    weights = np.stack([_sampled(table, 5.0, at) for table in (_X, _Y, _Z)])
+    return at, weights * ((at[1] - at[0]) / Y_INTEGRAL)
+
+
 def constant_to_rgb(value: float) -> np.ndarray:
     """Linear sRGB, float64 (3,), of a spectrum of the same `value` everywhere under equal energy."""
     return value * XYZ_TO_SRGB.sum(axis=1)
@@ -68,11 +78,9 @@ def sampled_to_rgb(wavelengths: np.ndarray, values: np.ndarray, light: bool) -> 
     A `light` is weighted by the observer alone (equal energy), anything else by D65 as well.  Colours
     outside the gamut are cut at 0, as in Mitsuba.
     """
-    at = np.linspace(FIRST_NM, LAST_NM, 1000)
-    weights = np.stack([_sampled(table, 5.0, at) for table in (_X, _Y, _Z)])
-    weights *= (at[1] - at[0]) / Y_INTEGRAL
+    at, weights = observer()
     if not light:
-        weights *= _sampled(_D65, 10.0, at) / D65_NORMALISATION
+        weights = weights * (_sampled(_D65, 10.0, at) / D65_NORMALISATION)
     xyz = weights @ np.interp(at, wavelengths, values, left=0.0, right=0.0)
     return np.maximum(XYZ_TO_SRGB @ xyz, 0.0)
 

@@ -22,7 +22,7 @@ LATER: dict[str, tuple[str, ...]] = {
         *("diffuse", "dielectric", "roughdielectric", "thindielectric", "conductor", "roughconductor"),
         *("plastic", "roughplastic", "twosided", "mask", "principled", "bumpmap", "normalmap", "blendbsdf"),
     ),
-    "phase": ("rayleigh", "blendphase", "sggx", "tabphase"),
+    "phase": ("sggx", "tabphase"),
     "emitter": ("area", "spot", "projector", "directionalarea", "sunsky"),
     "texture": ("bitmap", "checkerboard", "mesh_attribute", "volume", "uniform", "srgb", "d65", "blackbody"),
 }

@@ -4,7 +4,7 @@ Readers live here, with the checks that broken and hostile files need; brick map
 device do not.
 """
 
-from clvol.volumes.check import check_coefficients
+from clvol.volumes.check import check_coefficients, check_finite
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
 from clvol.volumes.numpy_files import dense_from_array, read_numpy
 from clvol.volumes.read import read_volume
@@ -17,6 +17,7 @@ __all__ = [
     "SparseGrid",
     "VdbGridInfo",
     "check_coefficients",
+    "check_finite",
     "dense_from_array",
     "list_vdb",
     "read_numpy",

@@ -29,8 +29,8 @@ class BrickMap:
 
     top : int32 (bz, by, bx), number of the brick at each place.
     brick_count : bricks to store; constants : float32 (n, channels), values of the last n of them.
-    minimum, maximum : float32 (2bz, 2by, 2bx), extrema over each cube of 4³ cells and all channels, of
-        any trilinear, nearest or ½-voxel jittered value in it.
+    minimum, maximum : float32 (2bz, 2by, 2bx, channels), extrema over each cube of 4³ cells, of any
+        trilinear, nearest or ½-voxel jittered value in it.
     size : samples per axis x, y, z (at least 2).  origin : grid index (x, y, z) of sample (0, 0, 0).
     """
 
@@ -46,17 +46,35 @@ class BrickMap:
 
     def stored(self) -> Iterator[tuple[int, np.ndarray]]:
         """Every brick to store, a bounded chunk at a time: (first brick, float32 (n, 9, 9, 9, channels))."""
-        varying = self.brick_count - len(self.constants)
-        gather = _gather_dense if isinstance(self.grid, DenseGrid) else _gather_sparse
-        first = 0  # varying bricks are numbered in the order of their places
-        for samples in gather(self.grid, self.top < varying):
-            yield first, samples
-            first += len(samples)
-        for number, values in enumerate(self.constants, varying):
+        yield from self._varying()
+        for number, values in enumerate(self.constants, self.brick_count - len(self.constants)):
             yield (
                 number,
                 np.broadcast_to(values, (1, BRICK_EDGE, BRICK_EDGE, BRICK_EDGE, self.channels)).copy(),
             )
+
+    def _varying(self) -> Iterator[tuple[int, np.ndarray]]:
+        """The same of the bricks that vary, which are numbered in the order of their places."""
+        gather = _gather_dense if isinstance(self.grid, DenseGrid) else _gather_sparse
+        first = 0
+        for samples in gather(self.grid, self.top < self.brick_count - len(self.constants)):
+            yield first, samples
+            first += len(samples)
+
+    def means(self) -> np.ndarray:
+        """Mean of the trilinear interpolant over each cube of 4³ cells: float32 (2bz, 2by, 2bx, channels).
+
+        Exact, by the trapezoid rule along each axis.  Reads the grid once more, in bounded memory.
+        """
+        varying = self.brick_count - len(self.constants)
+        varies = self.top < varying
+        values = np.empty((*self.top.shape, self.channels), np.float32)
+        values[~varies] = self.constants[self.top[~varies] - varying]
+        means = np.repeat(np.repeat(np.repeat(values, 2, 0), 2, 1), 2, 2)
+        places = np.argwhere(varies)
+        for first, samples in self._varying():
+            _put_halves(means, places[first : first + len(samples)], _half_means(samples))
+        return np.clip(means, self.minimum, self.maximum)
 
 
 def build_bricks(grid: Grid) -> BrickMap:
@@ -70,10 +88,7 @@ def build_bricks(grid: Grid) -> BrickMap:
     top = np.empty(varies.shape, np.int32)
     top[varies] = np.arange(count)
     top[~varies] = count + inverse.reshape(-1)
-    minimum, maximum = low.min(axis=3), high.max(axis=3)
-    return BrickMap(
-        grid, top, count + len(constants), constants, minimum, maximum, size, origin, low.shape[3]
-    )
+    return BrickMap(grid, top, count + len(constants), constants, low, high, size, origin, low.shape[3])
 
 
 def _merge_halves(values: np.ndarray, combine: np.ufunc) -> np.ndarray:
@@ -96,6 +111,29 @@ def _half_extrema(samples: np.ndarray, axis: int, combine: np.ufunc) -> np.ndarr
     ends = [slice(None)] * samples.ndim
     ends[axis] = slice(BOUND_CELLS, None, BOUND_CELLS)
     return combine(combine.reduce(blocks, axis=axis + 1), samples[tuple(ends)])
+
+
+def _half_means(samples: np.ndarray) -> np.ndarray:
+    """Means over the half bricks of bricks: (n, 9, 9, 9, channels) to float64 (n, 2, 2, 2, channels)."""
+    trapezoid = np.zeros((2, BRICK_EDGE))
+    for half, first in enumerate((0, BOUND_CELLS)):
+        trapezoid[half, first : first + BOUND_CELLS + 1] = 1 / BOUND_CELLS
+        trapezoid[half, [first, first + BOUND_CELLS]] /= 2
+    weights = np.einsum("az,by,cx->zyxabc", trapezoid, trapezoid, trapezoid).reshape(BRICK_SAMPLES, 8)
+    count, channels = len(samples), samples.shape[-1]
+    by_channel = np.moveaxis(samples, -1, 1).reshape(count * channels, BRICK_SAMPLES)
+    means = by_channel.astype(np.float64) @ weights
+    return np.moveaxis(means.reshape(count, channels, 2, 2, 2), 1, -1)
+
+
+def _put_halves(target: np.ndarray, places: np.ndarray, halves: np.ndarray) -> None:
+    """Write values of half bricks, (n, 2, 2, 2, channels), where the bricks at `places` have theirs.
+
+    places : int (n, 3), z y x.
+    """
+    z, y, x = 2 * places.T
+    for dz, dy, dx in np.ndindex(2, 2, 2):
+        target[z + dz, y + dy, x + dx] = halves[:, dz, dy, dx]
 
 
 def _lattice(grid: Grid) -> tuple[tuple[int, int, int], tuple[int, int, int], tuple[int, int, int]]:
@@ -188,13 +226,11 @@ def _extrema_sparse(grid: SparseGrid) -> tuple[np.ndarray, np.ndarray]:
     for first, samples in zip(
         range(0, len(places), _CHUNK_BRICKS), _gather_sparse(grid, varies), strict=True
     ):
-        z, y, x = 2 * places[first : first + _CHUNK_BRICKS].T
         for combine, target in ((np.minimum, low), (np.maximum, high)):
             halves = samples
             for axis in (1, 2, 3):
                 halves = _half_extrema(halves, axis, combine)
-            for dz, dy, dx in np.ndindex(2, 2, 2):
-                target[z + dz, y + dy, x + dx] = halves[:, dz, dy, dx]
+            _put_halves(target, places[first : first + _CHUNK_BRICKS], halves)
     return low, high
 
 

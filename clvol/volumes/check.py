@@ -1,4 +1,4 @@
-"""Whether samples can be coefficients of a medium: finite, not negative, and there at all."""
+"""Whether samples can be coefficients or temperatures of a medium: finite, not negative, there at all."""
 
 from __future__ import annotations
 
@@ -23,6 +23,15 @@ def check_coefficients(grid: Grid, what: str = "density") -> None:
         leaves (interpolation reads inactive ones too), the tiles and the background are checked.
     what : the coefficient the samples are used for, as the message names it.
     """
+    _check(grid, what, signed=False)
+
+
+def check_finite(grid: Grid, what: str) -> None:
+    """As `check_coefficients`, but samples may be negative, as temperatures may."""
+    _check(grid, what, signed=True)
+
+
+def _check(grid: Grid, what: str, signed: bool) -> None:
     where = place(grid.source, grid.name)
     if isinstance(grid, DenseGrid):
         if grid.values.size == 0:
@@ -34,9 +43,11 @@ def check_coefficients(grid: Grid, what: str = "density") -> None:
     for slab in _slabs(grid):
         total += slab.size
         low, high = slab.min(), slab.max()
-        if low >= 0 and np.isfinite(high):
+        if (np.isfinite(low) if signed else low >= 0) and np.isfinite(high):
             continue
         broken += slab.size - np.count_nonzero(np.isfinite(slab))
+        if signed:
+            continue
         below = (slab < 0) & np.isfinite(slab)
         negative += np.count_nonzero(below)
         lowest = min(lowest, float(slab.min(where=below, initial=0.0)))
@@ -49,7 +60,7 @@ def check_coefficients(grid: Grid, what: str = "density") -> None:
         raise VolumeError(
             f"{what} has {' and '.join(faults)} of {total} samples",
             where,
-            "coefficients must be finite and at least 0: repair or clamp the data",
+            f"samples must be finite{'' if signed else ' and at least 0'}: repair or clamp the data",
         )
 
 

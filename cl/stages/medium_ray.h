@@ -1,0 +1,34 @@
+/* A path's ray inside one medium, as trackers take it. */
+#ifndef CLVOL_STAGES_MEDIUM_RAY_H
+#define CLVOL_STAGES_MEDIUM_RAY_H
+#include "tracking/interface.h"
+
+INLINE bool is_homogeneous(__global const Medium *medium)
+{
+    return CLVOL_HAS_HOMOGENEOUS && (!CLVOL_HAS_HETEROGENEOUS || medium->homogeneous);
+}
+
+/* `world` starts inside the medium and leaves it at t_max; channel: what a path that follows one follows. */
+INLINE MediumRay medium_ray(const Scene *scene, __global const Medium *medium, Ray world, float t_max, int channel)
+{
+    MediumRay in;
+    in.scene = scene;
+    in.medium = medium;
+    in.world = world;
+    in.ray = world;
+    in.t_max = t_max;
+    in.channel = channel;
+#if CLVOL_EXTINCTION == 3
+    in.scale = load_vector(medium->sigma_t);
+#else
+    in.scale = medium->sigma_t[channel];
+#endif
+    in.rate = extinction_max(in.scale);
+#if CLVOL_HAS_HETEROGENEOUS
+    if (!is_homogeneous(medium))
+        in.ray = transform_ray(scene->volumes[medium->sigma_t_volume].world_to_index, world);
+#endif
+    return in;
+}
+
+#endif

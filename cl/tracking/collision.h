@@ -1,0 +1,29 @@
+/* What a technique fills in. */
+#ifndef CLVOL_TRACKING_COLLISION_H
+#define CLVOL_TRACKING_COLLISION_H
+#include "tracking/interface.h"
+
+typedef struct {
+    float t;           /* out: ray parameter of the collision */
+    Spectrum beta;     /* in and out: weight of the path */
+    Spectrum emission; /* in and out: emitted light that reached the path's start, weighted */
+} Collision;
+
+/* Ends a real collision's walk. */
+INLINE bool real_collision(float t, Tally *tally, Collision *collision)
+{
+    tally->real += 1;
+    collision->t = t;
+    return true;
+}
+
+/* Adds the emission met at t by a path of weight `beta` per unit of extinction (METHODS §2): at every
+   tentative collision beta is w sigma_t / sigma_maj. */
+INLINE void collect_emission(const MediumRay *in, float t, Spectrum beta, Collision *collision)
+{
+#if CLVOL_EMISSION_ON_WALKS
+    collision->emission += beta * medium_source(in->scene, in->medium, in->world.o + t * in->world.d, in->channel);
+#endif
+}
+
+#endif

@@ -1,0 +1,20 @@
+/* Regular transmittance: the exact optical depth, piece by piece, no variance (METHODS §4).  The majorant only
+   tells where the medium is empty. */
+#include "density/segments.h"
+#include "tracking/transmittance.h"
+
+INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream *stream, Tally *tally)
+{
+    Extinction depth = (Extinction)(0.0f);
+    MajorantWalk walk = majorant_begin(in);
+    while (majorant_next(in, &walk)) {
+        tally->cells += 1;
+        if (walk.majorant == 0.0f)
+            continue;
+        const float3 start = in->ray.o + walk.t * in->ray.d;
+        LatticeWalk piece = segments_begin(in, walk.t, walk.t_end);
+        while (lattice_next(&piece)) /* as many pieces as the volume has planes */
+            depth += segment_depth(in, start, &piece, stream, tally);
+    }
+    return exp_of_minus(depth);
+}

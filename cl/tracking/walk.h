@@ -1,0 +1,84 @@
+/* The walk that trackers share: from tentative collision to tentative collision, cell by cell.
+
+   Between collisions only the optical depth still to go is kept, so that crossing a cell costs no
+   random number.  Positions are measured from the cell's entry, to stay fine far along the ray. */
+#ifndef CLVOL_TRACKING_WALK_H
+#define CLVOL_TRACKING_WALK_H
+#include "tracking/interface.h"
+#include "tracking/probability.h"
+
+/* The part of a ray inside one cell, and where on it the walk stands. */
+typedef struct {
+    float3 start;
+    float begin; /* ray parameter of the start */
+    float length;
+    float rate; /* of tentative collisions, per world length */
+    float t;    /* from the start */
+} Stretch;
+
+INLINE Stretch stretch_of(const MediumRay *in, float t, float t_end, float rate)
+{
+    Stretch stretch = {in->ray.o + t * in->ray.d, t, t_end - t, rate, 0.0f};
+    return stretch;
+}
+
+/* Moves on by the optical depth still to go, to the next tentative collision; false when the stretch ends
+   before, with the rest in `depth`. */
+INLINE bool next_tentative(Stretch *stretch, float *depth, Tally *tally)
+{
+    const float left = (stretch->length - stretch->t) * stretch->rate;
+    if (*depth >= left) {
+        *depth -= left;
+        return false;
+    }
+    stretch->t += *depth / stretch->rate;
+    tally->tentative += 1;
+    return true;
+}
+
+INLINE float3 stretch_point(const MediumRay *in, const Stretch *stretch)
+{
+    return stretch->start + stretch->t * in->ray.d;
+}
+
+/* sigma_t at index position p: one look-up. */
+INLINE Extinction extinction_at(const MediumRay *in, float3 p, Stream *stream, Tally *tally)
+{
+    __global const Volume *volume = in->scene->volumes + in->medium->sigma_t_volume;
+    tally->lookups += 1;
+#if CLVOL_EXTINCTION == 3 && CLVOL_HAS_COLOURED_VOLUME
+    return in->scale * density3(in->scene, volume, p, stream);
+#else
+    return in->scale * density(in->scene, volume, p, in->channel, stream);
+#endif
+}
+
+/* A row of a table of coefficients per cell, `extra` numbers after its channels. */
+INLINE __global const float *cell_row(const MediumRay *in, __global const float *table, int cell, int extra)
+{
+    return table + (in->medium->cell_offset + cell) * (CLVOL_DENSITY_CHANNELS + extra);
+}
+
+/* The coefficient in such a row. */
+INLINE Extinction cell_extinction(const MediumRay *in, __global const float *row)
+{
+#if CLVOL_DENSITY_CHANNELS == 1
+    return in->scale * row[0];
+#elif CLVOL_EXTINCTION == 3
+    return in->scale * load_vector(row);
+#else
+    return in->scale * row[in->channel];
+#endif
+}
+
+/* How likely, but for a factor, an event of coefficient `sigma` is to be chosen by a path of weight beta. */
+INLINE float event_rate(Spectrum beta, Extinction sigma)
+{
+#if CLVOL_EXTINCTION == 3
+    return spectral_rate(beta, sigma);
+#else
+    return abs_of(sigma);
+#endif
+}
+
+#endif

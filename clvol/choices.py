@@ -1,0 +1,148 @@
+"""From what a user asks for to what is done: `auto` by fixed rules, and combinations that cannot be right.
+
+Every refusal is one sentence on why, and one on what to use.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from clvol import registry
+from clvol.errors import OptionError
+from clvol.features import Features
+from clvol.prepare import MajorantNeeds, PreparedScene, prepare
+from clvol.scene.records import Scene
+
+
+@dataclass(frozen=True)
+class Choices:
+    """Everything a user may choose about how a picture is estimated.
+
+    Parameters
+    ----------
+    technique, transmittance, majorant, lookup, absorption, probability, control : names of `clvol.registry`,
+        or "auto".
+    majorant_scale : multiplies every bound, for experiments.
+    step : world length of a marching step; None takes the edge of a voxel.
+    aov : names of `registry.AOVS` to return as pictures; look-ups always are.
+    """
+
+    technique: str = "auto"
+    transmittance: str = "auto"
+    majorant: str = "auto"
+    lookup: str = "auto"
+    absorption: str = "auto"
+    probability: str = "auto"
+    control: str = "auto"
+    majorant_scale: float = 1.0
+    step: float | None = None
+    aov: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        for family in registry.FAMILIES:
+            registry.check_choice(family, getattr(self, family))
+        object.__setattr__(self, "aov", _aovs(self.aov))
+        _check_positive("majorant_scale", self.majorant_scale)
+        if self.step is not None:
+            _check_positive("step", self.step)
+
+    @property
+    def names(self) -> dict[str, str]:
+        """The registry's choices, by family."""
+        return {family: getattr(self, family) for family in registry.FAMILIES}
+
+
+def _check_positive(name: str, value: float) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
+        raise OptionError(f"{name}={value!r} is not a positive number")
+
+
+def _aovs(names: str | tuple[str, ...] | list[str]) -> tuple[str, ...]:
+    names = (names,) if isinstance(names, str) else tuple(names)
+    for name in names:
+        if name not in registry.AOVS:
+            raise OptionError(f"unknown aov {name!r}", hint=f"choose among {', '.join(registry.AOVS)}")
+    return tuple(dict.fromkeys(names))
+
+
+def prepare_for(scene: Scene, choices: Choices) -> PreparedScene:
+    """Prepare a scene for what `choices` need of it; OptionError for a combination that cannot be right."""
+    features = Features.from_scene(scene)
+    resolved = resolve(features, choices.names)
+    refuse_impossible(features, choices, resolved)
+    return prepare(scene, majorant_needs(choices, resolved))
+
+
+def resolve(features: Features, asked: Mapping[str, str]) -> dict[str, str]:
+    """Every family's choice but the majorant's, which `prepare` weighs by its cost; `auto` follows the rules
+    that README states."""
+    rules = {
+        "technique": _technique(features),
+        "transmittance": _transmittance(features),
+        "lookup": "exact",
+        "absorption": "mixed",
+        "probability": "history",
+        "control": "mean",
+    }
+    return {family: asked[family] if asked[family] != "auto" else rule for family, rule in rules.items()}
+
+
+def _technique(features: Features) -> str:
+    """One channel's delta tracking is the cheapest; channels that differ share a path at no risk."""
+    return "spectral" if features.chromatic_extinction and not features.media_overlap else "delta"
+
+
+def _transmittance(features: Features) -> str:
+    """Scattering finds a constant sky as well as sampling it does, without the shadow ray."""
+    lights = features.envmap or features.directional or features.point_lights
+    return "ratio" if lights else "none"
+
+
+def majorant_needs(choices: Choices, resolved: Mapping[str, str]) -> MajorantNeeds:
+    """What the cells of the majorant have to carry."""
+    residual = resolved["transmittance"] == "residual-ratio"
+    return MajorantNeeds(
+        choices.majorant,
+        registry.TECHNIQUES[resolved["technique"]].control,
+        resolved["control"] if residual else "none",
+        choices.majorant_scale,
+    )
+
+
+def refuse_impossible(features: Features, choices: Choices, resolved: Mapping[str, str]) -> None:
+    """Raise OptionError for a combination that cannot be right, saying why and what to use."""
+    technique, transmittance = resolved["technique"], resolved["transmittance"]
+    tracker, estimator = registry.TECHNIQUES[technique], registry.TRANSMITTANCES[transmittance]
+    if transmittance == "none" and (features.directional or features.point_lights):
+        raise OptionError(
+            "transmittance 'none' cannot render point and directional lights",
+            hint="only next-event estimation reaches them: use ratio",
+        )
+    if not features.heterogeneous:
+        return  # closed forms take the place of every technique and transmittance
+    if features.media_overlap and tracker.weighted:
+        raise OptionError(
+            f"technique {technique!r} cannot walk overlapping media: its weights belong to one medium's walk",
+            hint="use delta, decomposition or regular",
+        )
+    used = [("technique", technique, tracker, "weighted-delta")]
+    if features.samples_lights and features.scattering:
+        used.append(("transmittance", transmittance, estimator, "ratio"))
+    for family, name, choice, instead in used:
+        if choices.majorant_scale < 1 and choice.needs_bound:
+            raise OptionError(
+                f"{family} {name!r} is biased where bounds are too low, as by a majorant_scale below 1",
+                hint=f"use one that carries weights, such as {instead}",
+            )
+        if resolved["lookup"] == "stochastic" and not choice.linear:
+            raise OptionError(
+                f"stochastic look-ups would bias {family} {name!r}, which is not linear in the density",
+                hint="use lookup exact",
+            )
+    if choices.step is not None and not (tracker.biased or estimator.biased):
+        raise OptionError(
+            "step is for ray marching, and nothing marches here",
+            hint="choose technique or transmittance marching",
+        )
