@@ -16,8 +16,6 @@ from clvol import render
 from clvol.accel.bounds import with_slack
 from clvol.scene.records import ConstantEmitter, DirectionalEmitter
 
-pytestmark = pytest.mark.xdist_group("agreement")  # pictures are shared between its tests
-
 CUBE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 SKY = (ConstantEmitter((0.6,)),)
 TRAVEL = tuple(unit((0.5, -1.0, 0.4)))

@@ -18,8 +18,6 @@ from walks import unbiased
 from clvol import registry, render
 from clvol.scene.records import ConstantEmitter, DirectionalEmitter
 
-pytestmark = pytest.mark.xdist_group("combinations")  # pictures are shared between its tests
-
 FAMILIES = ("technique", "transmittance", "majorant", "lookup", "absorption")
 TECHNIQUES, TRANSMITTANCES = unbiased("technique"), unbiased("transmittance")
 MAJORANTS, ABSORPTIONS = list(registry.MAJORANTS), list(registry.ABSORPTIONS)
