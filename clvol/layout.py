@@ -50,6 +50,7 @@ MEDIUM = _record(
     ("phase_first", "i", 1),  # first entry in `phases`
     ("phase_count", "i", 1),
     ("sample_emitters", "i", 1),
+    ("background", "f", 3),  # about what a ray inside will see: control of the weights' noise
     ("emits", "i", 1),
     ("emission", "f", 3),  # multiplies emission_volume and the blackbody, where there are any
     ("emission_volume", "i", 1),

@@ -119,6 +119,7 @@ def _media(prepared: PreparedScene, volumes: dict[int, int], step: float | None)
     shapes = [s for s in prepared.scene.shapes if s.interior is not None]
     table = np.zeros(len(shapes), layout.MEDIUM)
     cell_offset = kd_root = phase_first = 0
+    incident = mean_incident_radiance(prepared.scene)
     for record, shape in zip(table, shapes, strict=True):
         medium = shape.interior
         record["shape_from_world"] = rows_3x4(_from_centred(shape.to_world, prepared.centre))
@@ -129,6 +130,7 @@ def _media(prepared: PreparedScene, volumes: dict[int, int], step: float | None)
         phase_first += record["phase_count"]
         record["sample_emitters"] = int(medium.sample_emitters)
         _emission(record, medium, volumes)
+        record["background"] = incident * half_space_albedo(medium)
         record["sigma_t_volume"] = volumes.get(id(medium.sigma_t), -1)
         record["albedo_volume"] = volumes.get(id(medium.albedo), -1)
         if isinstance(medium.albedo, records.ConstVolume):
@@ -162,6 +164,31 @@ def _phases(media: list[records.Medium]) -> np.ndarray:
 def voxel_edges(volume: PreparedVolume) -> np.ndarray:
     """World lengths of a voxel's edges, float64 (3,)."""
     return np.linalg.norm(np.linalg.inv(volume.world_to_index)[:3, :3], axis=0)
+
+
+def mean_incident_radiance(scene: records.Scene) -> np.ndarray:
+    """Mean over all directions of the radiance that arrives from infinity, float64 (3,)."""
+    total = np.zeros(3)
+    for emitter in scene.emitters:
+        match emitter:
+            case records.ConstantEmitter():
+                total += _rgb(emitter.radiance)
+            case records.DirectionalEmitter():
+                total += _rgb(emitter.irradiance) / (4 * np.pi)
+            case records.EnvmapEmitter():
+                rows = emitter.radiance.mean(axis=1, dtype=np.float64)
+                weights = np.sin(np.pi * np.arange(len(rows)) / max(len(rows) - 1, 1)) + 1e-9
+                total += np.average(rows, axis=0, weights=weights)
+    return total
+
+
+def half_space_albedo(medium: records.Medium) -> np.ndarray:
+    """Share of diffuse light that a half-space of the medium returns, about (van de Hulst 1980), float64 (3,);
+    0 where the albedo varies."""
+    if not isinstance(medium.albedo, records.ConstVolume):
+        return np.zeros(3)
+    s = np.sqrt(1.0 - _rgb(medium.albedo.value))
+    return (1 - s) * (1 - 0.139 * s) / (1 + 1.17 * s)
 
 
 def _emission(record: np.void, medium: records.Medium, volumes: dict[int, int]) -> None:
