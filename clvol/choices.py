@@ -79,7 +79,7 @@ def resolve(features: Features, asked: Mapping[str, str]) -> dict[str, str]:
     """Every family's choice but the majorant's, which `prepare` weighs by its cost; `auto` follows the rules
     that README states."""
     rules = {
-        "technique": _technique(features),
+        "technique": "delta",  # of chromatic media too, a path for each channel: docs/techniques.md
         "transmittance": _transmittance(features),
         "lookup": "exact",
         "absorption": "mixed",
@@ -87,11 +87,6 @@ def resolve(features: Features, asked: Mapping[str, str]) -> dict[str, str]:
         "control": "mean",
     }
     return {family: asked[family] if asked[family] != "auto" else rule for family, rule in rules.items()}
-
-
-def _technique(features: Features) -> str:
-    """One channel's delta tracking is the cheapest; channels that differ share a path at no risk."""
-    return "spectral" if features.chromatic_extinction and not features.media_overlap else "delta"
 
 
 def _transmittance(features: Features) -> str:

@@ -41,9 +41,10 @@ class KernelConfig:
 
     @property
     def one_channel_per_path(self) -> bool:
-        """A path follows one channel, chosen for it (METHODS §3, delta), where channels are attenuated or
-        absorbed differently and the technique cannot follow them together.  Homogeneous media can be, but for
-        overlaps, whose walks must not carry weights."""
+        """A path follows one channel where channels are attenuated or absorbed differently and the technique
+        cannot follow them together (METHODS §3, delta); a sample is then a path for each channel, which
+        spares the noise of choosing one.  Homogeneous media can be followed together, but for overlaps, whose
+        walks must not carry weights."""
         f = self.features
         if f.media_overlap or (f.heterogeneous and not self.tracker.all_channels):
             return f.chromatic_extinction or (f.chromatic_albedo and self.absorption == "sample")
@@ -69,6 +70,11 @@ class KernelConfig:
         """Some stage walks majorant cells."""
         shadows = self.nee and registry.TRANSMITTANCES[self.transmittance].walks_majorant
         return self.majorant != "none" and (self.tracker.walks_majorant or shadows)
+
+    @property
+    def jobs_per_sample(self) -> int:
+        """Paths of one sample: one for each channel, where a path follows one."""
+        return self.channels if self.one_channel_per_path else 1
 
     @property
     def needs_controls(self) -> bool:
@@ -117,6 +123,7 @@ class KernelConfig:
             "CLVOL_SPECTRUM": self.spectrum,
             "CLVOL_EXTINCTION": self.extinction,
             "CLVOL_WEIGHTED": int(self.weighted),
+            "CLVOL_JOBS_PER_SAMPLE": self.jobs_per_sample,
             "CLVOL_ONE_CHANNEL_PER_PATH": int(self.one_channel_per_path),
             "CLVOL_HAS_MEDIA": int(f.media > 0),
             "CLVOL_HAS_MANY_MEDIA": int(f.media > 1),

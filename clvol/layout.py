@@ -325,7 +325,7 @@ def _counts_text(config: KernelConfig) -> list[str]:
         for n, name in enumerate(counts)
     ]
     if weight:
-        reset.append(f"set_path_largest_weight(scene, slot, {config.first_weight}f);")
+        reset.append("set_path_largest_weight(scene, slot, 1.0f);")
         write.append(
             f"scene->result_counts[place * CLVOL_RESULT_COUNTS + {len(counts)}u]"
             " = as_uint(path_largest_weight(scene, slot));"

@@ -170,12 +170,13 @@ class Session:
     def _pictures(self, count: int) -> dict[str, np.ndarray]:
         """Look-ups and what `aov` asks for: means per path, and the largest weight; float32 (pixels,)."""
         pixels = self.wavefront.pixels
-        counts = {n: (c.astype(np.float64) / count) for n, c in self.wavefront.counts().items()}
+        paths = count * self.config.jobs_per_sample
+        counts = {n: c.astype(np.float64) / paths for n, c in self.wavefront.counts().items()}
         peaks = self.wavefront.peaks_by_pixel()
         found = {}
         for name in dict.fromkeys(("lookups", *self.config.aov)):
             if name == "largest_weight":
-                values = peaks.get(name, np.full(pixels, self.config.first_weight))
+                values = peaks.get(name, np.ones(pixels))
             elif name == "null":
                 values = counts["tentative"] - counts["real"] if "tentative" in counts else np.zeros(pixels)
             else:
@@ -189,7 +190,7 @@ class Session:
         peaks = {n: float(p.max(initial=0.0)) for n, p in wavefront.peaks_by_pixel().items()}
         counts = {n: int(slots.get(n, 0)) for n in registry.COUNTS}
         counts |= {n: int(c.sum()) for n, c in wavefront.counts().items()}
-        paths = count * wavefront.pixels
+        paths = count * wavefront.pixels * self.config.jobs_per_sample
         stats = {
             "paths": paths,
             "lookups": counts["lookups"],
@@ -205,9 +206,7 @@ class Session:
             "non_finite": wavefront.non_finite(),
             "majorant_violations": counts["violations"],
             "walks_exhausted": int(slots.get("exhausted", 0)),
-            "largest_weight": max(
-                self.config.first_weight, slots.get("largest_weight", 0.0), peaks.get("largest_weight", 0.0)
-            ),
+            "largest_weight": max(1.0, slots.get("largest_weight", 0.0), peaks.get("largest_weight", 0.0)),
             "largest_sample": peaks["largest_sample"],
             "paths_cut_by_max_depth": int(slots.get("cut", 0)),
             "energy_lost_to_caps": slots.get("cut_energy", 0.0) / paths,

@@ -130,7 +130,7 @@ def _media(prepared: PreparedScene, volumes: dict[int, int], step: float | None)
         phase_first += record["phase_count"]
         record["sample_emitters"] = int(medium.sample_emitters)
         _emission(record, medium, volumes)
-        record["background"] = incident * half_space_albedo(medium)
+        record["background"] = incident * expected_albedo(medium)
         record["sigma_t_volume"] = volumes.get(id(medium.sigma_t), -1)
         record["albedo_volume"] = volumes.get(id(medium.albedo), -1)
         if isinstance(medium.albedo, records.ConstVolume):
@@ -182,13 +182,13 @@ def mean_incident_radiance(scene: records.Scene) -> np.ndarray:
     return total
 
 
-def half_space_albedo(medium: records.Medium) -> np.ndarray:
-    """Share of diffuse light that a half-space of the medium returns, about (van de Hulst 1980), float64 (3,);
-    0 where the albedo varies."""
+def expected_albedo(medium: records.Medium) -> np.ndarray:
+    """Root of the share of diffuse light that a half-space of the medium returns (van de Hulst 1980), a guess
+    between that and the 1 of its rim, float64 (3,); 0 where the albedo varies."""
     if not isinstance(medium.albedo, records.ConstVolume):
         return np.zeros(3)
     s = np.sqrt(1.0 - _rgb(medium.albedo.value))
-    return (1 - s) * (1 - 0.139 * s) / (1 + 1.17 * s)
+    return np.sqrt((1 - s) * (1 - 0.139 * s) / (1 + 1.17 * s))
 
 
 def _emission(record: np.void, medium: records.Medium, volumes: dict[int, int]) -> None:

@@ -1,7 +1,7 @@
 """The wavefront: path slots, queues, and the schedule that keeps the device busy.
 
-Jobs (one sample of one pixel each) are numbered; a free slot takes the next number.  A *pass* is a run
-of jobs that gives every pixel the same number of samples; its results stand in a ring buffer and are
+Jobs (one sample of one pixel each, or one channel of it) are numbered; a free slot takes the next number.
+A *pass* is a run of jobs that gives every pixel the same number of samples; its results stand in a ring buffer and are
 added to the film once all of them have arrived, in the order of the samples.  Several passes are in
 flight together, so that no slot waits for a pass to end.
 """
@@ -79,7 +79,8 @@ class Wavefront:
         self.device, self.config, self.kernels, self.pool = device, config, kernels, pool
         self.render = render
         self.pixels = int(render["film_size"][0, 0]) * int(render["film_size"][0, 1])
-        self.pass_samples = max(1, pool.pass_jobs // self.pixels)
+        self.sample_jobs = self.pixels * config.jobs_per_sample  # of one sample of every pixel
+        self.pass_samples = max(1, pool.pass_jobs // self.sample_jobs)
         self.groups = pool.slots // config.group_slots
         self.fields = layout.path_fields(config)
         self.path_counts = layout.path_counts(config)
@@ -92,14 +93,14 @@ class Wavefront:
         self._allocate(buffers)
 
     def _allocate(self, scene_buffers: dict[str, cl.Buffer]) -> None:
-        ring_jobs = self.pass_samples * self.pixels * self.pool.ring_passes
+        ring_jobs = self.pass_samples * self.sample_jobs * self.pool.ring_passes
         sizes = {
             "render": self.render.nbytes,
             "state": 4 * len(self.fields) * self.stride,
             "queues": 4 * len(layout.ENUMS["QUEUE"]) * self.pool.slots,
             "counts": 4 * layout.COUNTER_STRIDE * self.groups,
             "control": 4 * (_DONE + self.pool.ring_passes),
-            "results": 4 * self.config.channels * ring_jobs,
+            "results": 4 * self.config.channels * ring_jobs // self.config.jobs_per_sample,
             "result_counts": 4 * (len(self.path_counts) + self.peaks - 1) * ring_jobs,
         }
         self.buffers = {name: self._buffer(size) for name, size in sizes.items()} | scene_buffers
@@ -143,7 +144,7 @@ class Wavefront:
         """
         done = 0
         start = time.perf_counter()
-        per_round = max(1, _MAX_ROUND_JOBS // (self.pass_samples * self.pixels)) * self.pass_samples
+        per_round = max(1, _MAX_ROUND_JOBS // (self.pass_samples * self.sample_jobs)) * self.pass_samples
         while done < count and not (done and should_stop()):
             part = min(count - done, per_round)
             finished = self._run_round(
@@ -164,7 +165,7 @@ class Wavefront:
         passes = -(-count // self.pass_samples)
         samples = [self.pass_samples] * passes
         samples[-1] = count - (passes - 1) * self.pass_samples
-        pass_jobs = self.pass_samples * self.pixels
+        pass_jobs = self.pass_samples * self.sample_jobs
         self._start_round(first, pass_jobs, passes - 1, samples[-1])
         begun = finished = 0
         waves = 1
@@ -173,7 +174,7 @@ class Wavefront:
                 allowed = min(passes, finished + self.pool.ring_passes)
             else:
                 allowed = begun
-            limit = sum(samples[:allowed]) * self.pixels
+            limit = sum(samples[:allowed]) * self.sample_jobs
             self._write("control", np.array([limit], np.uint32), 4 * _JOB_LIMIT)
             elapsed = self._launch(waves)
             waves = int(np.clip(waves * _BATCH_SECONDS / max(elapsed, 1e-6), 1, max(2 * waves, 4)))
@@ -183,7 +184,7 @@ class Wavefront:
             begun = min(allowed, -(-int(control[_NEXT_JOB]) // pass_jobs))
             while finished < begun:
                 place = finished % self.pool.ring_passes
-                if control[_DONE + place] != samples[finished] * self.pixels:
+                if control[_DONE + place] != samples[finished] * self.sample_jobs:
                     break
                 self._accumulate(place, samples[finished])
                 finished += 1
@@ -194,7 +195,7 @@ class Wavefront:
     def warm_up(self) -> None:
         """Run every kernel once with nothing to do: some drivers (PoCL) compile at the first launch, which
         is part of setting up and not of the render."""
-        self._start_round(0, self.pass_samples * self.pixels, 0, self.pass_samples)
+        self._start_round(0, self.pass_samples * self.sample_jobs, 0, self.pass_samples)
         self._launch(1)
         self._accumulate(0, 0)
         self.seconds = dict.fromkeys(self.seconds, 0.0)
@@ -248,7 +249,7 @@ class Wavefront:
             *self.film.values(),
             self.buffers["control"],
             np.uint32(ring_pass),
-            np.uint32(self.pass_samples * self.pixels),
+            np.uint32(self.pass_samples * self.sample_jobs),
             np.uint32(samples),
             np.uint32(self.pixels),
         )

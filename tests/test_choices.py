@@ -33,7 +33,7 @@ OVERLAPPING = scene(more=[box((0.5, 0, 0), (1.5, 1, 1), homogeneous(1.0, 0.5))])
     [
         (scene(), "delta", "ratio"),
         (scene(lights=(SKY,)), "delta", "none"),
-        (scene((3.0, 2.0, 1.0)), "spectral", "ratio"),
+        (scene((3.0, 2.0, 1.0)), "delta", "ratio"),
         (OVERLAPPING, "delta", "ratio"),
     ],
     ids=["grey", "under a sky", "chromatic", "overlapping"],

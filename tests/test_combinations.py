@@ -81,7 +81,7 @@ def scene(channels):
 @functools.cache
 def pictures(channels):
     """Every combination's picture, each of a seed of its own."""
-    combinations, spp = (COMBINATIONS, 1 << 11) if channels == 1 else (CHROMATIC, 12_288)
+    combinations, spp = (COMBINATIONS, 1 << 11) if channels == 1 else (CHROMATIC, 1 << 12)
     results = {}
     for seed, combination in enumerate(combinations):
         choices = dict(zip(FAMILIES, combination, strict=True))

@@ -207,8 +207,8 @@ def test_grey_scenes_carry_one_channel_and_smaller_paths(device):
     grey = config_of(device, scene([fog()], [SUN]))
     coloured_light = config_of(device, scene([fog()], [DirectionalEmitter((1, 0.5, 0.2), (0, -1, 0))]))
     assert (grey.channels, coloured_light.channels) == (1, 3)
-    assert "#define CLVOL_CHANNELS 1\n" in programs.stage_source(grey, "generate")
-    assert "#define CLVOL_CHANNELS 3\n" in programs.stage_source(coloured_light, "generate")
+    assert "#define CLVOL_CHANNELS 1\n" in programs.stage_source(grey, "accumulate")
+    assert "#define CLVOL_CHANNELS 3\n" in programs.stage_source(coloured_light, "accumulate")
     # beta, radiance and the shadow ray's light: three numbers each instead of one
     assert bytes_per_slot(coloured_light) - bytes_per_slot(grey) == 4 * 3 * 2
 
@@ -223,7 +223,7 @@ def test_one_channel_per_path_costs_one_field(device):
     assert field_names(chromatic) - field_names(grey) == {"channel"}
 
 
-@pytest.mark.parametrize("technique", ["spectral", "spectral-decomposition", "regular", "auto"])
+@pytest.mark.parametrize("technique", ["spectral", "spectral-decomposition", "regular"])
 def test_techniques_that_follow_all_channels_carry_them(device, technique):
     config = config_of(device, scene([COLOURED_GRID], [SUN]), technique=technique)
     assert (config.channels, config.spectrum, config.extinction) == (3, 3, 3)

@@ -3,6 +3,7 @@
 A cloud whose extinction is 60, 30, 10 and whose albedo is 0.95, 0.9, 0.8 in red, green and blue, under a
 white sky: the default technique against delta tracking of each channel by itself, by turns.  Three grey
 renders of n samples each count as one render of n samples: their images are the channels, their times add up.
+The bars: delta tracking of all events, absorption too ("sample"), and what `auto` takes for grey ("mixed").
 """
 
 from __future__ import annotations
@@ -55,36 +56,41 @@ def timed(device, scene: Scene, choices: Choices, spp: int, seed: int):
 def main(res: int, spp: int, rounds: int, technique: str, device: str | None) -> None:
     """Compare a chromatic render with three grey ones, in efficiency: 1 / (variance x CPU time)."""
     opened = open_device(device)
-    chosen, delta = Choices(technique=technique), Choices(technique="delta")
+    chosen = Choices(technique=technique)
     whole = cloud(SIGMA_T, ALBEDO, res)
     greys = [cloud((s,), (a,), res) for s, a in zip(SIGMA_T, ALBEDO, strict=True)]
-    for scene, choices in ((whole, chosen), *((grey, delta) for grey in greys)):
+    bars = {name: Choices(technique="delta", absorption=name) for name in ("sample", "mixed")}
+    for scene, choices in ((whole, chosen), *((grey, bar) for bar in bars.values() for grey in greys)):
         timed(opened, scene, choices, 4, 0)
-    sides: dict[str, tuple[list, list]] = {"chromatic": ([], []), "grey": ([], [])}
+    sides: dict[str, tuple[list, list]] = {name: ([], []) for name in ("chromatic", *bars)}
     for seed in range(1, rounds + 1):
         result, cpu = timed(opened, whole, chosen, spp, seed)
         sides["chromatic"][0].append(result.image)
         sides["chromatic"][1].append(cpu)
-        parts = [timed(opened, grey, delta, spp, seed + 1000 * c) for c, grey in enumerate(greys, 1)]
-        sides["grey"][0].append(np.stack([r.image[..., 0] for r, _ in parts], axis=-1))
-        sides["grey"][1].append(sum(cpu for _, cpu in parts))
+        for name, bar in bars.items():
+            parts = [timed(opened, grey, bar, spp, seed + 1000 * c) for c, grey in enumerate(greys, 1)]
+            sides[name][0].append(np.stack([r.image[..., 0] for r, _ in parts], axis=-1))
+            sides[name][1].append(sum(cpu for _, cpu in parts))
     found = {name: Rounds(np.stack(images), np.array(cpu), spp) for name, (images, cpu) in sides.items()}
     print(f"sigma_t {SIGMA_T}, albedo {ALBEDO}, {res} x {res}, {rounds} rounds, {thread_count()} threads")
-    print(f"technique: {result.metadata['technique']}, absorption {result.metadata['absorption']}")
+    print(f"chromatic: technique {result.metadata['technique']}, absorption {result.metadata['absorption']}")
     for name, side in found.items():
+        what = "one chromatic render" if name == "chromatic" else f"three grey ones, absorption {name}"
         print(
-            f"{name:9s} variance per sample {pixel_variance(side).mean():.5f}, "
+            f"{what}: variance per sample {pixel_variance(side).mean():.5f}, "
             f"CPU us per sample {1e6 * np.median(side.cpu) / side.paths:.3f}"
         )
     for channel in range(3):
-        one = {n: replace(s, images=s.images[..., channel : channel + 1]) for n, s in found.items()}
-        means = [image_mean(one[name]) for name in found]
+        part = np.s_[..., channel : channel + 1]
+        one = [replace(found[name], images=found[name].images[part]) for name in ("chromatic", "mixed")]
+        means = [image_mean(side) for side in one]
         print(f"channel {channel}: means {means[0][0]:.6f}, {means[1][0]:.6f}, z {z_score(*means):+.2f}")
-    ratio = efficiency_ratio(found["chromatic"], found["grey"])
-    print(
-        f"efficiency, chromatic over three grey renders: {ratio['median']:.2f} "
-        f"(95 % interval {ratio['low']:.2f} to {ratio['high']:.2f})"
-    )
+    for name in bars:
+        ratio = efficiency_ratio(found["chromatic"], found[name])
+        print(
+            f"efficiency, chromatic over three grey renders with absorption {name}: {ratio['median']:.2f} "
+            f"(95 % interval {ratio['low']:.2f} to {ratio['high']:.2f})"
+        )
     white = cloud(SIGMA_T, (0.999,) * 3, res)
     result, _ = timed(opened, white, chosen, 1000, 1)
     print(

@@ -21,11 +21,13 @@ __kernel void accumulate_kernel(__global const float *results, __global const ui
     const uint pixel = get_global_id(0);
     if (pixel >= pixels)
         return;
-    const size_t first = (size_t)ring_pass * pass_jobs + (size_t)pixel * samples;
+    const uint jobs = samples * CLVOL_JOBS_PER_SAMPLE; /* of the pixel */
+    const size_t first_job = (size_t)ring_pass * pass_jobs + (size_t)pixel * jobs;
+    const size_t first = first_job / CLVOL_JOBS_PER_SAMPLE;
     for (uint n = 0; n < CLVOL_PATH_COUNTS; ++n) {
         ulong total = 0;
-        for (uint s = 0; s < samples; ++s)
-            total += result_counts[(first + s) * CLVOL_RESULT_COUNTS + n];
+        for (uint job = 0; job < jobs; ++job)
+            total += result_counts[(first_job + job) * CLVOL_RESULT_COUNTS + n];
         film_counts[(size_t)pixel * CLVOL_PATH_COUNTS + n] += total;
     }
     float peak = film_peaks[(size_t)pixel * CLVOL_PEAKS];
@@ -47,8 +49,8 @@ __kernel void accumulate_kernel(__global const float *results, __global const ui
     film_peaks[(size_t)pixel * CLVOL_PEAKS] = peak;
 #if CLVOL_PEAKS > 1 /* the largest weight, the last of a result's numbers */
     float weight = film_peaks[(size_t)pixel * CLVOL_PEAKS + 1];
-    for (uint s = 0; s < samples; ++s)
-        weight = max_of(weight, as_float(result_counts[(first + s) * CLVOL_RESULT_COUNTS + CLVOL_PATH_COUNTS]));
+    for (uint job = 0; job < jobs; ++job)
+        weight = max_of(weight, as_float(result_counts[(first_job + job) * CLVOL_RESULT_COUNTS + CLVOL_PATH_COUNTS]));
     film_peaks[(size_t)pixel * CLVOL_PEAKS + 1] = weight;
 #endif
 }

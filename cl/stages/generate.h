@@ -2,19 +2,15 @@
 #ifndef CLVOL_STAGES_GENERATE_H
 #define CLVOL_STAGES_GENERATE_H
 
-/* A job is one sample of one pixel; consecutive jobs are samples of one pixel, so that rays that
-   run together stay together. */
+/* A job is one sample of one pixel, or, where a path follows one channel, a third of it; consecutive jobs are
+   channels of a sample and samples of a pixel, so that rays that run together stay together. */
 INLINE void write_result(const Scene *scene, uint slot, uint job)
 {
     const uint ring_jobs = scene->render->pass_jobs * scene->render->ring_passes;
     const uint place = job % ring_jobs;
     const Spectrum radiance = get_radiance(scene, slot);
-#if CLVOL_CHANNELS == 1
+#if CLVOL_SPECTRUM == 1
     scene->results[place] = radiance;
-#elif CLVOL_ONE_CHANNEL_PER_PATH
-    const uint channel = path_channel(scene, slot);
-    for (uint c = 0; c < 3; ++c)
-        scene->results[3 * (size_t)place + c] = c == channel ? radiance : 0.0f;
 #else
     vstore3(radiance, place, scene->results);
 #endif
@@ -57,7 +53,8 @@ INLINE float filter_offset(const Scene *scene, uint k, int pixel, int pixels)
 INLINE void start_job(const Scene *scene, uint slot, uint job)
 {
     __global const Render *render = scene->render;
-    const uint pass = job / render->pass_jobs, in_pass = job % render->pass_jobs;
+    const uint pass = job / render->pass_jobs;
+    const uint in_pass = job % render->pass_jobs / CLVOL_JOBS_PER_SAMPLE; /* its sample within the pass */
     const uint samples = pass == render->last_pass ? render->last_samples : render->pass_samples;
     const uint pixel = in_pass / samples;
     SampleKey key;
@@ -74,9 +71,9 @@ INLINE void start_job(const Scene *scene, uint slot, uint job)
     set_path_direction(scene, slot, normalize(load_vector(render->camera_base) + x * load_vector(render->camera_base_dx) +
                                               y * load_vector(render->camera_base_dy)));
 #if CLVOL_ONE_CHANNEL_PER_PATH
-    set_path_channel(scene, slot, (uint)(((ulong)k.z * 3u) >> 32));
+    set_path_channel(scene, slot, job % CLVOL_JOBS_PER_SAMPLE);
 #endif
-    set_beta(scene, slot, (Spectrum)(FIRST_WEIGHT));
+    set_beta(scene, slot, (Spectrum)(1.0f));
     set_radiance(scene, slot, (Spectrum)(0.0f));
     set_path_pixel(scene, slot, key.pixel);
     set_path_sample(scene, slot, key.sample);

@@ -8,9 +8,6 @@
 
 #define NO_JOB 0xFFFFFFFFu
 
-/* Weight of a new path: a channel chosen with probability 1/3 counts three times. */
-#define FIRST_WEIGHT (CLVOL_ONE_CHANNEL_PER_PATH ? 3.0f : 1.0f)
-
 INLINE __global uint *queue_counter(const Scene *scene, uint group, uint queue)
 {
     return scene->counts + group * COUNTER_STRIDE + queue;

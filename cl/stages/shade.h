@@ -7,7 +7,7 @@
 #define CLVOL_STAGES_SHADE_H
 #include "tracking/probability.h"
 
-/* Share of a path's first weight below which absorption is sampled (absorption "mixed").  On cloud.xml, with
+/* Weight of a path below which absorption is sampled (absorption "mixed").  On cloud.xml, with
    next-event estimation, 1/2 was 1.4 times as efficient as never sampling it and 1.9 times as always. */
 #define MIXED_WEIGHT 0.5f
 
@@ -52,7 +52,7 @@ INLINE bool survives_absorption(const Scene *scene, SampleKey key, uint interval
         *beta *= albedo;
         const float weight = spectrum_max(*beta);
         if (CLVOL_ABSORPTION == ABSORPTION_MIXED)
-            survival = min_of(1.0f, weight * (1.0f / (MIXED_WEIGHT * FIRST_WEIGHT)));
+            survival = min_of(1.0f, weight * (1.0f / MIXED_WEIGHT));
         else
             survival = weight > 0.0f ? 1.0f : 0.0f;
     }
@@ -100,7 +100,7 @@ INLINE bool scatter(const Scene *scene, uint group, uint slot, SampleKey key, __
 #if CLVOL_HAS_MAX_DEPTH
     if (key.bounce >= scene->render->max_depth) {
         set_path_cut(scene, slot, path_cut(scene, slot) + 1);
-        set_path_cut_energy(scene, slot, path_cut_energy(scene, slot) + spectrum_mean(beta) / FIRST_WEIGHT);
+        set_path_cut_energy(scene, slot, path_cut_energy(scene, slot) + spectrum_mean(beta));
         return false;
     }
 #endif
