@@ -1,9 +1,9 @@
 """The wavefront: path slots, queues, and the schedule that keeps the device busy.
 
 Jobs (one sample of one pixel each, or one channel of it) are numbered; a free slot takes the next number.
-A *pass* is a run of jobs that gives every pixel the same number of samples; its results stand in a ring buffer and are
-added to the film once all of them have arrived, in the order of the samples.  Several passes are in
-flight together, so that no slot waits for a pass to end.
+A *pass* is a run of jobs that gives every pixel the same number of samples; its results stand in a ring
+buffer and are added to the film once all of them have arrived, in the order of the samples.  Several passes
+are in flight together, so that no slot waits for a pass to end.
 """
 
 from __future__ import annotations
