@@ -66,7 +66,7 @@ class Row:
         result = session.result(0, done, 0.0)
         self.images.append(result.image)
         self.cpu.append(cpu)
-        self.lookups = result.stats["lookups"] / result.stats["paths"]
+        self.lookups = result.stats["lookups"] / (result.image[..., 0].size * spp)
         self.largest_weight = max(self.largest_weight, result.stats["largest_weight"])
         self.largest_sample = max(self.largest_sample, result.stats["largest_sample"])
         return cpu
