@@ -167,8 +167,11 @@ def voxel_edges(volume: PreparedVolume) -> np.ndarray:
 
 
 def mean_incident_radiance(scene: records.Scene) -> np.ndarray:
-    """Mean over all directions of the radiance that arrives from infinity, float64 (3,)."""
+    """Mean over all directions of the radiance that arrives from infinity, float64 (3,); 0 where a limit of
+    depth keeps most of it from the picture."""
     total = np.zeros(3)
+    if 0 <= scene.integrator.max_depth < 3:
+        return total
     for emitter in scene.emitters:
         match emitter:
             case records.ConstantEmitter():

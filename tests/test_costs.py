@@ -104,6 +104,36 @@ def test_with_history_no_weight_exceeds_the_number_of_channels(technique, absorp
     assert result.stats["largest_weight"] <= 3 * (1 + 1e-4)
 
 
+def white_chromatic_scene(albedo=1.0):
+    lumps = np.random.default_rng(8).random((8, 8, 8)) ** 2
+    medium = Medium(grid_volume(lumps), ConstVolume((albedo,)), (20.0, 10.0, 3.0), homogeneous=False)
+    return scene_of(medium)
+
+
+@pytest.mark.parametrize("technique", ["spectral", "spectral-decomposition", "regular"])
+def test_at_albedo_one_under_a_white_sky_weights_make_no_noise(technique):
+    """The control variate knows what every path will see."""
+    result = render(white_chromatic_scene(), spp=64, technique=technique)
+    assert result.stats["largest_weight"] > 1.5
+    assert np.abs(result.image - 1).max() < 1e-4
+
+
+def test_the_background_lowers_the_noise_and_leaves_the_mean(monkeypatch):
+    from stat_tests import assert_same_picture
+
+    with_it = render(white_chromatic_scene(0.9), spp=512, technique="spectral", seed=1)
+    monkeypatch.setattr("clvol.upload.expected_albedo", lambda medium: np.zeros(3))
+    without = render(white_chromatic_scene(0.9), spp=512, technique="spectral", seed=2)
+    assert_same_picture(with_it, without, tile=4)
+    assert with_it.variance.mean() < 0.5 * without.variance.mean()
+
+
+def test_a_limit_of_depth_leaves_no_background():
+    scene = white_chromatic_scene(0.9)
+    scene = type(scene)(**{**vars(scene), "integrator": type(scene.integrator)(max_depth=0)})
+    assert (render(scene, spp=4, technique="spectral").image == 0).all()
+
+
 def test_with_other_rules_weights_do_exceed_it():
     """The same scene: what `history` is there for."""
     largest = {
