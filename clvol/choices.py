@@ -6,8 +6,9 @@ Every refusal is one sentence on why, and one on what to use.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from numbers import Real
 
 from clvol import registry
 from clvol.errors import OptionError
@@ -55,16 +56,24 @@ class Choices:
 
 
 def _check_positive(name: str, value: float) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
+    if isinstance(value, bool) or not isinstance(value, Real) or not 0 < value < math.inf:
         raise OptionError(f"{name}={value!r} is not a positive number")
 
 
-def _aovs(names: str | tuple[str, ...] | list[str]) -> tuple[str, ...]:
-    names = (names,) if isinstance(names, str) else tuple(names)
+def _aovs(names: str | Iterable[str]) -> tuple[str, ...]:
+    names = (names,) if isinstance(names, str) else names
+    if not isinstance(names, Iterable):
+        raise OptionError(
+            f"aov={names!r} is not a list of names", hint=f"choose among {', '.join(registry.AOVS)}"
+        )
     for name in names:
         if name not in registry.AOVS:
             raise OptionError(f"unknown aov {name!r}", hint=f"choose among {', '.join(registry.AOVS)}")
     return tuple(dict.fromkeys(names))
+
+
+MOST_STEPS = 1e5
+"""Marching steps across the scene beyond which a step is taken for a mistake."""
 
 
 def prepare_for(scene: Scene, choices: Choices) -> PreparedScene:
@@ -72,7 +81,14 @@ def prepare_for(scene: Scene, choices: Choices) -> PreparedScene:
     features = Features.from_scene(scene)
     resolved = resolve(features, choices.names)
     refuse_impossible(features, choices, resolved)
-    return prepare(scene, majorant_needs(choices, resolved))
+    prepared = prepare(scene, majorant_needs(choices, resolved))
+    if choices.step is not None and 2 * prepared.radius / choices.step > MOST_STEPS:
+        across = 2 * prepared.radius / choices.step
+        raise OptionError(
+            f"step {choices.step:g} is too fine: {across:.2g} steps across the scene",
+            hint=f"give at least {2 * prepared.radius / MOST_STEPS:.2g}",
+        )
+    return prepared
 
 
 def resolve(features: Features, asked: Mapping[str, str]) -> dict[str, str]:
@@ -115,6 +131,12 @@ def refuse_impossible(features: Features, choices: Choices, resolved: Mapping[st
             "transmittance 'none' cannot render point and directional lights",
             hint="only next-event estimation reaches them: use ratio",
         )
+    marches = features.heterogeneous and (tracker.biased or estimator.biased)
+    if choices.step is not None and not marches:
+        raise OptionError(
+            "step is for ray marching, and nothing marches here",
+            hint="choose technique or transmittance marching",
+        )
     if not features.heterogeneous:
         return  # closed forms take the place of every technique and transmittance
     if features.media_overlap and tracker.weighted:
@@ -136,8 +158,3 @@ def refuse_impossible(features: Features, choices: Choices, resolved: Mapping[st
                 f"stochastic look-ups would bias {family} {name!r}, which is not linear in the density",
                 hint="use lookup exact",
             )
-    if choices.step is not None and not (tracker.biased or estimator.biased):
-        raise OptionError(
-            "step is for ray marching, and nothing marches here",
-            hint="choose technique or transmittance marching",
-        )

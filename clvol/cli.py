@@ -151,6 +151,8 @@ def render(
         raise click.UsageError("give --spp or --time, not both")
     for output in outputs:
         image_io.check_output(output)
+    if options["aov"] and not any(image_io.output_suffix(output) == ".exr" for output in outputs):
+        raise click.UsageError("--aov needs an .exr to write to")
     console = Console(stderr=True)
     with _logging_to(console, verbose):
         import clvol
@@ -214,8 +216,8 @@ def _summary(result: Result, outputs: tuple[str, ...]) -> Iterator[str]:
     yield f"  {seconds:.2f} s, {rate:,.0f} samples/s, noise {format_noise(result.noise)}"
     choices = ("technique", "transmittance", "majorant", "lookup")
     chosen = ", ".join(f"{key} {about[key]}" for key in choices)
-    lookups = result.stats["lookups"] / max(result.stats["paths"], 1)
-    yield f"  {chosen}; {lookups:.4g} look-ups per path"
+    lookups = result.stats["lookups"] / max(width * height * count, 1)
+    yield f"  {chosen}; {lookups:.4g} look-ups per sample"
 
 
 @main.command()

@@ -52,7 +52,7 @@ def render(
     majorant_scale : multiplies every bound of the density, for experiments; below 1 only for techniques and
         transmittances that stay unbiased there.
     step : world length of a step of ray marching; the edge of a voxel by default.
-    aov : names from `registry.AOVS` to add to `result.aovs`, means per path ("largest_weight": the maximum).
+    aov : names from `registry.AOVS` to add to `result.aovs`: means per sample ("largest_weight": maxima).
     time_limit : seconds after which no new pass of samples is begun; alone it replaces `spp`.
     device : index or part of the name of an OpenCL device (see `clvol devices`).
     progress : True for a progress bar, or a callable that receives `clvol.progress.Progress` records.

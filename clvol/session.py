@@ -27,6 +27,8 @@ from clvol.wavefront import Pool, Progressed, Wavefront
 log = logging.getLogger("clvol")
 MAX_SAMPLES = 2**32 - 1
 """Samples of a pixel are numbered in 32 bits; a render without an end asks for all of them."""
+LARGE_WEIGHT = 100.0
+"""Paths that weigh so much more than others are rare: few samples do not show them."""
 _NOISE_SECONDS = 0.5
 """The noise shown by the progress bar is read from the film at most this often."""
 
@@ -116,6 +118,12 @@ class Session:
             f"{f} {used[f]}" for f, table in families.items() if used[f] in table and table[used[f]].biased
         ]
 
+    def needs_bound(self) -> bool:
+        """Whether a choice in force is right only where majorants bound the density."""
+        used = self.choices()
+        families = {"technique": registry.TECHNIQUES, "transmittance": registry.TRANSMITTANCES}
+        return any(used[f] in table and table[used[f]].needs_bound for f, table in families.items())
+
     def run(
         self,
         first: int,
@@ -168,10 +176,9 @@ class Session:
         return Result.from_sums(*sums, (first, count), aovs, stats, metadata)
 
     def _pictures(self, count: int) -> dict[str, np.ndarray]:
-        """Look-ups and what `aov` asks for: means per path, and the largest weight; float32 (pixels,)."""
+        """Look-ups and what `aov` asks for: means per sample, and the largest weight; float32 (pixels,)."""
         pixels = self.wavefront.pixels
-        paths = count * self.config.jobs_per_sample
-        counts = {n: c.astype(np.float64) / paths for n, c in self.wavefront.counts().items()}
+        counts = {n: c.astype(np.float64) / count for n, c in self.wavefront.counts().items()}
         peaks = self.wavefront.peaks_by_pixel()
         found = {}
         for name in dict.fromkeys(("lookups", *self.config.aov)):
@@ -217,9 +224,24 @@ class Session:
             and not self.config.features.homogeneous
         ):
             log.warning("no path met any density: are the transforms right?")
-        for name in ("non_finite", "majorant_violations", "walks_exhausted"):
+        for name in ("non_finite", "walks_exhausted"):
             if stats[name]:
                 log.warning("%s: %d", name.replace("_", " "), stats[name])
+        if stats["majorant_violations"]:
+            log.warning(
+                "%d of %d look-ups were above their majorant: %s",
+                stats["majorant_violations"],
+                stats["lookups"],
+                "the picture is biased"
+                if self.needs_bound()
+                else "these techniques stay unbiased, at more noise",
+            )
+        if stats["largest_weight"] > LARGE_WEIGHT:
+            log.warning(
+                "weights grew to %.2g: the picture is noisier than its variance says; raise majorant_scale, use "
+                "probability history, or a technique without weights",
+                stats["largest_weight"],
+            )
         log.info("set-up (kernels, volumes, majorants) %8.3f seconds", setup_seconds)
         for stage, seconds in wavefront.seconds.items():
             log.info("stage %-20s %8.3f seconds", stage, seconds)

@@ -169,7 +169,7 @@ def test_render_writes_every_picture_and_a_summary(scene: str, tmp_path: Path) -
     assert (spec.width, spec.height) == (10, 6)
     assert spec.get_int_attribute("spp") == 3 and spec.get_int_attribute("seed") == 5
     assert png.exists()
-    for text in ("a.exr", "10 x 6 pixels, 3 spp", "samples/s", "noise", "technique ", "look-ups per path"):
+    for text in ("a.exr", "10 x 6 pixels, 3 spp", "samples/s", "noise", "technique ", "look-ups per sample"):
         assert text in outcome.stdout
     assert outcome.stderr == ""
 

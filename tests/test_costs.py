@@ -155,7 +155,7 @@ def test_counts_of_a_render_add_up():
     assert stats["lookups"] == stats["tentative_collisions"] > 0
     pixels = result.image.shape[0] * result.image.shape[1]
     for name, total in (("null", "null_collisions"), ("cells", "cells_crossed"), ("lookups", "lookups")):
-        assert result.aovs[name].sum(dtype=float) * 24 == pytest.approx(stats[total], rel=1e-5)
+        assert result.aovs[name].sum(dtype=float) * 8 == pytest.approx(stats[total], rel=1e-5)
         assert result.aovs[name].shape == result.image.shape[:2]
     assert result.aovs["largest_weight"].max() == pytest.approx(stats["largest_weight"])
     assert stats["paths"] == 24 * pixels, "a path for each channel of a sample"

@@ -27,7 +27,7 @@ SCENES = {
     "chromatic smoke": (
         "scenes/smoke.xml",
         {"width": 72, "height": 96},
-        "smoke whose extinction is 60 : 30 : 10 in red, green and blue, in low sunlight",
+        "smoke whose extinction is 6 : 3 : 1 in red, green and blue, in low sunlight",
     ),
     "fire": (
         "scenes/fire.xml",
@@ -40,7 +40,7 @@ Made by `{command}`, on {threads} threads.
 Renders take turns; the variance (mean over pixels and channels, of one sample) is the one between rounds, and
 has itself an error of some percent; times are CPU times of the render, the building of kernels and majorants
 apart. Efficiency is 1 / (variance × time), as a multiple of what `auto` takes, and varies by a tenth from run
-to run. The means of all unbiased rows of a scene agree within their errors; those of marching need not."""
+to run. The means of all unbiased rows of a scene agree but for their errors; those of marching need not."""
 
 
 @dataclass
