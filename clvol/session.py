@@ -238,8 +238,8 @@ class Session:
             )
         if stats["largest_weight"] > LARGE_WEIGHT:
             log.warning(
-                "weights grew to %.2g: the picture is noisier than its variance says; raise majorant_scale, use "
-                "probability history, or a technique without weights",
+                "weights grew to %.2g: the picture is noisier than its variance says; raise majorant_scale, "
+                "use probability history, or a technique without weights",
                 stats["largest_weight"],
             )
         log.info("set-up (kernels, volumes, majorants) %8.3f seconds", setup_seconds)
