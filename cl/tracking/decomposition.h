@@ -5,38 +5,28 @@
    of rate sigma_maj whose tentative collisions belong to the control with probability sigma_c / sigma_maj:
    these are real, and only the others look the density up. */
 #include "tracking/collision.h"
-#include "tracking/walk.h"
+#include "tracking/flight.h"
 
 INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Tally *tally, Collision *collision)
 {
-    float depth = exponential_variate(first);
-    uint budget = WALK_BUDGET;
-    MajorantWalk walk = majorant_begin(in);
-    while (majorant_next(in, &walk)) {
-        const float majorant = walk.majorant;
-        const float control = cell_extinction(in, cell_row(in, in->scene->controls, walk.cell, 0));
+    Flight flight = flight_begin(in, first);
+    while (flight_next(in, &flight, tally)) {
+        const float majorant = flight.walk.majorant;
+        const float control = cell_extinction(in, cell_row(in, in->scene->controls, flight.walk.cell, 0));
         const float residual = majorant - control;
-        Stretch stretch = stretch_of(in, walk.t, walk.t_end, majorant);
-        tally->cells += 1;
-        while (next_tentative(&stretch, &depth, tally)) {
-            const float t = stretch.begin + stretch.t;
-            const uint2 choice = stream_pair(stream);
-            if (choose_event(choice.x, control, residual)) {
-                collect_emission(in, t, collision->beta, collision); /* sigma_c / (sigma_maj P_c) = 1 */
-                return real_collision(t, tally, collision);
-            }
-            const float sigma_t = extinction_at(in, stretch_point(in, &stretch), stream, tally);
-            tally->violations += sigma_t > majorant || sigma_t < control ? 1 : 0;
-            const float sigma_r = sigma_t - control;
-            collect_emission(in, t, collision->beta * (sigma_r / residual), collision);
-            if (choose_event(choice.y, sigma_r, majorant - sigma_t))
-                return real_collision(t, tally, collision);
-            if (--budget == 0) {
-                tally->exhausted += 1;
-                return false;
-            }
-            depth = exponential_variate(stream_pair(stream).x);
+        const float t = stretch_t(&flight.stretch);
+        const uint2 choice = stream_pair(stream);
+        if (choose_event(choice.x, control, residual)) {
+            collect_emission(in, t, collision->beta, collision); /* sigma_c / (sigma_maj P_c) = 1 */
+            return real_collision(t, tally, collision);
         }
+        const float sigma_t = stretch_extinction(in, &flight.stretch, stream, tally);
+        tally->violations += sigma_t > majorant || sigma_t < control ? 1 : 0;
+        const float sigma_r = sigma_t - control;
+        collect_emission(in, t, collision->beta * (sigma_r / residual), collision);
+        if (choose_event(choice.y, sigma_r, majorant - sigma_t))
+            return real_collision(t, tally, collision);
+        flight.depth = exponential_variate(stream_pair(stream).x);
     }
     return false;
 }

@@ -30,7 +30,7 @@ INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream
         float paid = 0.0f; /* part of the stretch whose control is in control_depth */
         tally->cells += 1;
         while (next_tentative(&stretch, &depth, tally)) {
-            const Extinction sigma_t = extinction_at(in, stretch_point(in, &stretch), stream, tally);
+            const Extinction sigma_t = stretch_extinction(in, &stretch, stream, tally);
             transmittance *= 1.0f - (sigma_t - control) / stretch.rate;
             control_depth += control * (stretch.t - paid);
             paid = stretch.t;

@@ -36,11 +36,6 @@ INLINE bool next_tentative(Stretch *stretch, float *depth, Tally *tally)
     return true;
 }
 
-INLINE float3 stretch_point(const MediumRay *in, const Stretch *stretch)
-{
-    return stretch->start + stretch->t * in->ray.d;
-}
-
 /* sigma_t at index position p: one look-up. */
 INLINE Extinction extinction_at(const MediumRay *in, float3 p, Stream *stream, Tally *tally)
 {
@@ -51,6 +46,17 @@ INLINE Extinction extinction_at(const MediumRay *in, float3 p, Stream *stream, T
 #else
     return in->scale * density(in->scene, volume, p, in->channel, stream);
 #endif
+}
+
+/* sigma_t where the stretch, or the flight, stands. */
+INLINE Extinction stretch_extinction(const MediumRay *in, const Stretch *at, Stream *stream, Tally *tally)
+{
+    return extinction_at(in, at->start + at->t * in->ray.d, stream, tally);
+}
+
+INLINE float stretch_t(const Stretch *at)
+{
+    return at->begin + at->t;
 }
 
 /* A row of a table of coefficients per cell, `extra` numbers after its channels. */

@@ -6,43 +6,30 @@
    probabilities, and whether or not sigma_maj bounds sigma_t.  With the rule `history` the mean weight of
    the channels stays as it is as long as sigma_maj bounds them all. */
 #include "tracking/collision.h"
-#include "tracking/walk.h"
+#include "tracking/flight.h"
 
 INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Tally *tally, Collision *collision)
 {
     Spectrum beta = collision->beta;
-    float depth = exponential_variate(first);
-    uint budget = WALK_BUDGET;
-    MajorantWalk walk = majorant_begin(in);
-    while (majorant_next(in, &walk)) {
-        const float majorant = walk.majorant;
-        Stretch stretch = stretch_of(in, walk.t, walk.t_end, majorant);
-        tally->cells += 1;
-        while (next_tentative(&stretch, &depth, tally)) {
-            const float t = stretch.begin + stretch.t;
-            const Extinction sigma_t = extinction_at(in, stretch_point(in, &stretch), stream, tally);
-            const Extinction sigma_n = majorant - sigma_t;
-            tally->violations += extinction_max(sigma_t) > majorant ? 1 : 0;
-            collect_emission(in, t, beta * (sigma_t / majorant), collision);
-            const float real = event_rate(beta, sigma_t), null = event_rate(beta, sigma_n);
-            const uint2 k = stream_pair(stream);
-            if (!(real + null > 0.0f)) { /* no weight is left in any channel */
-                collision->beta = beta;
-                return false;
-            }
-            if (choose_event(k.x, real, null)) {
-                collision->beta = beta * (sigma_t / majorant) * ((real + null) / real);
-                return real_collision(t, tally, collision);
-            }
-            beta *= (sigma_n / majorant) * ((real + null) / null);
-            tally->weight = max_of(tally->weight, spectrum_max(beta));
-            if (--budget == 0) {
-                tally->exhausted += 1;
-                collision->beta = beta;
-                return false;
-            }
-            depth = exponential_variate(k.y);
+    Flight flight = flight_begin(in, first);
+    while (flight_next(in, &flight, tally)) {
+        const float majorant = flight.walk.majorant;
+        const float t = stretch_t(&flight.stretch);
+        const Extinction sigma_t = stretch_extinction(in, &flight.stretch, stream, tally);
+        const Extinction sigma_n = majorant - sigma_t;
+        tally->violations += extinction_max(sigma_t) > majorant ? 1 : 0;
+        collect_emission(in, t, beta * (sigma_t / majorant), collision);
+        const float real = event_rate(beta, sigma_t), null = event_rate(beta, sigma_n);
+        const uint2 k = stream_pair(stream);
+        if (!(real + null > 0.0f))
+            break; /* no weight is left in any channel */
+        if (choose_event(k.x, real, null)) {
+            collision->beta = beta * (sigma_t / majorant) * ((real + null) / real);
+            return real_collision(t, tally, collision);
         }
+        beta *= (sigma_n / majorant) * ((real + null) / null);
+        tally->weight = max_of(tally->weight, spectrum_max(beta));
+        flight.depth = exponential_variate(k.y);
     }
     collision->beta = beta;
     return false;

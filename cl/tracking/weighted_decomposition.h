@@ -6,55 +6,42 @@
    split over real and null events of the residual in proportion to event_rate().  Weights are
    sigma_e / (sigma_maj P_e) with their sign, so that the control may exceed the density. */
 #include "tracking/collision.h"
-#include "tracking/walk.h"
+#include "tracking/flight.h"
 
 INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Tally *tally, Collision *collision)
 {
     Spectrum beta = collision->beta;
-    float depth = exponential_variate(first);
-    uint budget = WALK_BUDGET;
-    MajorantWalk walk = majorant_begin(in);
-    while (majorant_next(in, &walk)) {
-        const float majorant = walk.majorant;
-        const Extinction control = cell_extinction(in, cell_row(in, in->scene->controls, walk.cell, 0));
-        Stretch stretch = stretch_of(in, walk.t, walk.t_end, majorant);
-        tally->cells += 1;
-        while (next_tentative(&stretch, &depth, tally)) {
-            const float t = stretch.begin + stretch.t;
-            const uint2 choice = stream_pair(stream);
-            const float part = event_rate(beta, control), rest = event_rate(beta, majorant - control);
-            if (!(part + rest > 0.0f)) { /* no weight is left in any channel */
-                collision->beta = beta;
-                return false;
-            }
-            if (choose_event(choice.x, part, rest)) {
-                collision->beta = beta * (control / majorant) * ((part + rest) / part);
-                collect_emission(in, t, collision->beta, collision);
-                return real_collision(t, tally, collision);
-            }
-            const Extinction sigma_t = extinction_at(in, stretch_point(in, &stretch), stream, tally);
-            const Extinction sigma_r = sigma_t - control, sigma_n = majorant - sigma_t;
-            tally->violations += extinction_max(sigma_t) > majorant ? 1 : 0;
-            beta *= (part + rest) / rest;
-            collect_emission(in, t, beta * (sigma_r / majorant), collision);
-            const float real = event_rate(beta, sigma_r), null = event_rate(beta, sigma_n);
-            if (!(real + null > 0.0f)) { /* nothing but the control is here: what is left has no weight */
-                collision->beta = (Spectrum)(0.0f);
-                return false;
-            }
-            if (choose_event(choice.y, real, null)) {
-                collision->beta = beta * (sigma_r / majorant) * ((real + null) / real);
-                return real_collision(t, tally, collision);
-            }
-            beta *= (sigma_n / majorant) * ((real + null) / null);
-            tally->weight = max_of(tally->weight, spectrum_max(beta));
-            if (--budget == 0) {
-                tally->exhausted += 1;
-                collision->beta = beta;
-                return false;
-            }
-            depth = exponential_variate(stream_pair(stream).x);
+    Flight flight = flight_begin(in, first);
+    while (flight_next(in, &flight, tally)) {
+        const float majorant = flight.walk.majorant;
+        const Extinction control = cell_extinction(in, cell_row(in, in->scene->controls, flight.walk.cell, 0));
+        const float t = stretch_t(&flight.stretch);
+        const uint2 choice = stream_pair(stream);
+        const float part = event_rate(beta, control), rest = event_rate(beta, majorant - control);
+        if (!(part + rest > 0.0f))
+            break; /* no weight is left in any channel */
+        if (choose_event(choice.x, part, rest)) {
+            collision->beta = beta * (control / majorant) * ((part + rest) / part);
+            collect_emission(in, t, collision->beta, collision);
+            return real_collision(t, tally, collision);
         }
+        const Extinction sigma_t = stretch_extinction(in, &flight.stretch, stream, tally);
+        const Extinction sigma_r = sigma_t - control, sigma_n = majorant - sigma_t;
+        tally->violations += extinction_max(sigma_t) > majorant ? 1 : 0;
+        beta *= (part + rest) / rest;
+        collect_emission(in, t, beta * (sigma_r / majorant), collision);
+        const float real = event_rate(beta, sigma_r), null = event_rate(beta, sigma_n);
+        if (!(real + null > 0.0f)) { /* nothing but the control is here: what is left has no weight */
+            collision->beta = (Spectrum)(0.0f);
+            return false;
+        }
+        if (choose_event(choice.y, real, null)) {
+            collision->beta = beta * (sigma_r / majorant) * ((real + null) / real);
+            return real_collision(t, tally, collision);
+        }
+        beta *= (sigma_n / majorant) * ((real + null) / null);
+        tally->weight = max_of(tally->weight, spectrum_max(beta));
+        flight.depth = exponential_variate(stream_pair(stream).x);
     }
     collision->beta = beta;
     return false;

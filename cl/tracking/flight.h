@@ -1,0 +1,40 @@
+/* The loop that most trackers are: a walk at rate sigma_maj, with the majorant of each cell as its bound. */
+#ifndef CLVOL_TRACKING_FLIGHT_H
+#define CLVOL_TRACKING_FLIGHT_H
+#include "tracking/walk.h"
+
+/* A walk of rate sigma_maj, from tentative collision to tentative collision through all cells. */
+typedef struct {
+    MajorantWalk walk;
+    Stretch stretch;
+    float depth; /* still to go; the tracker draws it anew at each tentative collision */
+    uint budget;
+} Flight;
+
+INLINE Flight flight_begin(const MediumRay *in, uint first)
+{
+    Flight flight;
+    flight.walk = majorant_begin(in);
+    flight.stretch = stretch_of(in, 0.0f, 0.0f, 0.0f); /* empty: the first cell is still to be entered */
+    flight.depth = exponential_variate(first);
+    flight.budget = WALK_BUDGET;
+    return flight;
+}
+
+/* Moves on to the next tentative collision; false at the end of the ray, or of the budget. */
+INLINE bool flight_next(const MediumRay *in, Flight *flight, Tally *tally)
+{
+    while (!next_tentative(&flight->stretch, &flight->depth, tally)) {
+        if (!majorant_next(in, &flight->walk))
+            return false;
+        flight->stretch = stretch_of(in, flight->walk.t, flight->walk.t_end, flight->walk.majorant);
+        tally->cells += 1;
+    }
+    if (flight->budget-- == 0) {
+        tally->exhausted += 1;
+        return false;
+    }
+    return true;
+}
+
+#endif
