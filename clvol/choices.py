@@ -107,7 +107,7 @@ def resolve(features: Features, asked: Mapping[str, str]) -> dict[str, str]:
 
 def _transmittance(features: Features) -> str:
     """Scattering finds a constant sky as well as sampling it does, without the shadow ray."""
-    lights = features.envmap or features.directional or features.point_lights
+    lights = features.envmap or features.directional or features.near_lights
     return "ratio" if lights else "none"
 
 
@@ -126,9 +126,9 @@ def refuse_impossible(features: Features, choices: Choices, resolved: Mapping[st
     """Raise OptionError for a combination that cannot be right, saying why and what to use."""
     technique, transmittance = resolved["technique"], resolved["transmittance"]
     tracker, estimator = registry.TECHNIQUES[technique], registry.TRANSMITTANCES[transmittance]
-    if transmittance == "none" and (features.directional or features.point_lights):
+    if transmittance == "none" and (features.directional or features.point_lights or features.spot):
         raise OptionError(
-            "transmittance 'none' cannot render point and directional lights",
+            "transmittance 'none' cannot render point, spot and directional lights",
             hint="only next-event estimation reaches them: use ratio",
         )
     marches = features.heterogeneous and (tracker.biased or estimator.biased)
@@ -139,11 +139,6 @@ def refuse_impossible(features: Features, choices: Choices, resolved: Mapping[st
         )
     if not features.heterogeneous:
         return  # closed forms take the place of every technique and transmittance
-    if features.media_overlap and tracker.weighted:
-        raise OptionError(
-            f"technique {technique!r} cannot walk overlapping media: its weights belong to one medium's walk",
-            hint="use delta, decomposition or regular",
-        )
     used = [("technique", technique, tracker, "weighted-delta")]
     if features.samples_lights and features.scattering:
         used.append(("transmittance", transmittance, estimator, "ratio"))

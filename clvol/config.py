@@ -8,7 +8,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from clvol import registry
+from clvol.accel.bvh import WIDTH
+from clvol.accel.bvh_split import MOST_DEPTH
 from clvol.features import Features
+from clvol.scene.materials import BSDFS
+
+BVH_STACK = (WIDTH - 1) * MOST_DEPTH + 1
+"""Nodes that a traversal of the surfaces' hierarchy may keep waiting: siblings on every level."""
 
 
 @dataclass(frozen=True)
@@ -36,17 +42,16 @@ class KernelConfig:
     def channels(self) -> int:
         """Channels of the image: 1 when every coefficient and light is grey, else 3."""
         f = self.features
-        chromatic = f.chromatic_extinction or f.chromatic_albedo or f.chromatic_light or f.chromatic_emission
-        return 3 if chromatic else 1
+        media = f.chromatic_extinction or f.chromatic_albedo or f.chromatic_emission
+        return 3 if media or f.chromatic_light or f.chromatic_surfaces else 1
 
     @property
     def one_channel_per_path(self) -> bool:
         """A path follows one channel where channels are attenuated or absorbed differently and the technique
         cannot follow them together (METHODS §3, delta); a sample is then a path for each channel, which
-        spares the noise of choosing one.  Homogeneous media can be followed together, but for overlaps, whose
-        walks must not carry weights."""
+        spares the noise of choosing one.  Homogeneous media can be followed together."""
         f = self.features
-        if f.media_overlap or (f.heterogeneous and not self.tracker.all_channels):
+        if f.heterogeneous and not self.tracker.all_channels:
             return f.chromatic_extinction or (f.chromatic_albedo and self.absorption == "sample")
         return False
 
@@ -93,14 +98,15 @@ class KernelConfig:
 
     @property
     def nee(self) -> bool:
-        """Next-event estimation: there are lights to sample and media that scatter towards them."""
+        """Next-event estimation: there are lights to sample, and media or surfaces that scatter to them."""
         f = self.features
-        return self.transmittance != "none" and f.samples_lights and f.scattering
+        return self.transmittance != "none" and f.samples_lights and (f.scattering or f.samples_at_surfaces)
 
     @property
     def mis(self) -> bool:
-        """Both ways of finding an environment are in use, so that they must be weighted."""
-        return self.nee and (self.features.constant or self.features.envmap)
+        """Both ways of finding a light are in use, so that they must be weighted."""
+        f = self.features
+        return self.nee and (f.constant or f.envmap or f.area)
 
     @property
     def stages(self) -> tuple[str, ...]:
@@ -127,6 +133,7 @@ class KernelConfig:
             "CLVOL_ONE_CHANNEL_PER_PATH": int(self.one_channel_per_path),
             "CLVOL_HAS_MEDIA": int(f.media > 0),
             "CLVOL_HAS_MANY_MEDIA": int(f.media > 1),
+            "CLVOL_HAS_STRETCHES": int(f.stretches),
             "CLVOL_HAS_OVERLAP": int(f.media_overlap),
             "CLVOL_HAS_HOMOGENEOUS": int(f.homogeneous),
             "CLVOL_HAS_HETEROGENEOUS": int(f.heterogeneous),
@@ -151,7 +158,29 @@ class KernelConfig:
             "CLVOL_HAS_ENVMAP": int(f.envmap),
             "CLVOL_HAS_DIRECTIONAL": int(f.directional),
             "CLVOL_HAS_POINT": int(f.point_lights),
+            "CLVOL_HAS_SPOT": int(f.spot),
+            "CLVOL_HAS_AREA": int(f.area),
+            "CLVOL_HAS_AREA_MESH": int(f.area_meshes),
+            "CLVOL_HAS_AREA_SPHERE": int(f.area_spheres),
+            "CLVOL_HAS_AREA_DISK": int(f.area_disks),
+            "CLVOL_HAS_AREA_CYLINDER": int(f.area_cylinders),
+            "CLVOL_HAS_SURFACES": int(f.surfaces > 0),
+            "CLVOL_HAS_TRIANGLES": int(f.triangles),
+            "CLVOL_HAS_QUADRICS": int(f.quadrics),
+            "CLVOL_HAS_SHADING_NORMALS": int(f.shading_normals),
+            "CLVOL_HAS_VERTEX_UVS": int(f.vertex_uvs),
+            "CLVOL_HAS_TEXTURES": int(f.textures),
+            "CLVOL_HAS_BITMAPS": int(f.bitmaps),
+            "CLVOL_HAS_REFLECTION": int(f.reflecting),
+            "CLVOL_HAS_PASSABLE": int(f.passable),
+            "CLVOL_HAS_TRANSMISSION": int(f.transmissive),
+            "CLVOL_BOUNDARY_WORDS": f.boundary_words,
+            "CLVOL_CAMERA_INSIDE": int(f.camera_inside),
+            "CLVOL_BVH_STACK": BVH_STACK,
+            **{f"CLVOL_BSDF_{name}": int(name in f.bsdfs) for name in BSDFS},
             "CLVOL_HAS_FILTER_TABLE": int(f.filter_table),
+            "CLVOL_HAS_SIGNED_FILTER": int(f.signed_filter),
+            "CLVOL_HAS_LENS": int(f.lens),
             "CLVOL_HAS_MAX_DEPTH": int(f.depth_limited),
             "CLVOL_HIDE_EMITTERS": int(f.hide_emitters),
             "CLVOL_NEE": int(self.nee),

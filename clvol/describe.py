@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from clvol.scene import records
+from clvol.scene.materials import Bsdf, Dielectric, Mask, Null, TwoSided
 from clvol.volumes import VdbGridInfo, list_vdb, read_volume
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
 from clvol.volumes.vdb import VALUE_TYPES
@@ -106,21 +108,67 @@ def describe_scene(scene: records.Scene) -> list[str]:
 
 def _scene_lines(scene: records.Scene) -> Iterator[str]:
     film, integrator = scene.film, scene.integrator
-    position = scene.sensor.to_world[:3, 3]
-    yield f"camera   perspective at {_point(position)}, field of view {_number(scene.sensor.fov)} degrees"
-    yield f"film     {film.width} x {film.height} pixels, {film.rfilter.kind} filter, {scene.spp} spp"
+    yield f"camera   {_camera(scene.sensor)}"
+    crop = f", of them {film.crop[2]} x {film.crop[3]} from {_point(film.crop[:2])}" if film.crop else ""
+    rfilter = _filter(film.rfilter)
+    yield f"film     {film.width} x {film.height} pixels{crop}, {rfilter} filter, {scene.spp} spp"
     depth = "unlimited" if integrator.max_depth < 0 else str(integrator.max_depth)
     choices = "".join(f", {key} {value}" for key, value in integrator.choices.items())
     yield f"paths    max_depth {depth}, rr_depth {integrator.rr_depth}{choices}"
     for shape in scene.shapes:
-        yield f"shape    {shape.kind}{f' {shape.name!r}' if shape.name else ''}, {_medium(shape.interior)}"
+        yield f"shape    {_shape(shape)}"
     for emitter in scene.emitters:
         yield f"light    {_emitter(emitter)}"
 
 
-def _medium(medium: records.Medium | None) -> str:
-    if medium is None:
-        return "empty"
+def _camera(sensor: records.Perspective) -> str:
+    position, fov = _point(sensor.to_world[:3, 3]), _number(sensor.fov)
+    if not sensor.aperture_radius:
+        return f"perspective at {position}, field of view {fov} degrees"
+    radius, distance = _number(sensor.aperture_radius), _number(sensor.focus_distance)
+    lens = f"aperture radius {radius}, in focus at {distance}"
+    return f"thin lens at {position}, field of view {fov} degrees, {lens}"
+
+
+def _filter(rfilter: records.ReconstructionFilter) -> str:
+    if rfilter.kind == "mitchell":
+        return f"mitchell (B {_number(rfilter.b)}, C {_number(rfilter.c)})"
+    return rfilter.kind
+
+
+def _shape(shape: records.Shape) -> str:
+    """What a shape is, is made of, emits and bounds; an invisible surface is not mentioned."""
+    parts = [f"{shape.kind} {shape.name!r}" if shape.name else shape.kind]
+    if shape.mesh:
+        parts[0] += f" of {len(shape.mesh.faces):,} triangles ({shape.mesh.source})"
+    if shape.flip_normals:
+        parts.append("normals flipped")
+    if not isinstance(shape.bsdf, Null):
+        parts.append(_bsdf(shape.bsdf))
+    if shape.emission:
+        parts.append(f"radiance {_spectrum(shape.emission)}")
+    if shape.exterior:
+        parts.append(f"before it {_medium(shape.exterior)}")
+    if shape.interior:
+        parts.append(_medium(shape.interior))
+    return ", ".join(parts if len(parts) > 1 else [*parts, "empty"])
+
+
+def _bsdf(bsdf: Bsdf) -> str:
+    """A BSDF's name, and what is inside a wrapper."""
+    name = re.sub("(?<=[a-z])(?=[A-Z])", " ", type(bsdf).__name__).lower()
+    match bsdf:
+        case Dielectric(thin=True):
+            return "thin dielectric"
+        case TwoSided():
+            back = "" if bsdf.back is bsdf.front else f" and {_bsdf(bsdf.back)}"
+            return f"two sided ({_bsdf(bsdf.front)}{back})"
+        case Mask():
+            return f"mask ({_bsdf(bsdf.nested)})"
+    return name
+
+
+def _medium(medium: records.Medium) -> str:
     return (
         f"{'homogeneous' if medium.homogeneous else 'heterogeneous'} medium: "
         f"sigma_t {_volume(medium.sigma_t)} times {_spectrum(medium.scale)}, "
@@ -169,6 +217,12 @@ def _emitter(emitter: records.Emitter) -> str:
             )
         case records.PointEmitter():
             return f"point, intensity {_spectrum(emitter.intensity)}, at {_point(emitter.position)}"
+        case records.SpotEmitter():
+            position, axis = emitter.to_world[:3, 3], emitter.to_world[:3, 2]
+            return (
+                f"spot, intensity {_spectrum(emitter.intensity)}, at {_point(position)}, along "
+                f"{_point(axis / np.linalg.norm(axis))}, to {_number(emitter.cutoff_angle)} degrees"
+            )
 
 
 def _box(box: np.ndarray) -> str:

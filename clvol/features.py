@@ -6,9 +6,29 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from clvol.boundaries import Boundaries, camera_may_be_inside, find_boundaries, may_overlap
+from clvol.film import SIGNED
+from clvol.material_facts import (
+    bsdf_kinds,
+    bsdf_sides,
+    bsdf_textures,
+    has_bitmaps,
+    has_tables,
+    is_grey,
+    is_transmissive,
+    passes_light,
+    reflects,
+    samples_lights,
+)
 from clvol.scene import records
+from clvol.scene.materials import Bsdf
 from clvol.scene.phase import phase_lobes
+from clvol.scene.primitives import canonical_mesh
 from clvol.volumes.grid import DenseGrid
+
+QUADRICS = ("sphere", "disk", "cylinder")
+FLAT = ("cube", "rectangle")
+"""Kinds of shape that are met as quadrics, and as triangles; a "mesh" has its own."""
 
 
 def _is_grey(volume: records.Volume) -> bool:
@@ -56,22 +76,49 @@ class Features:
     envmap: bool = False
     directional: bool = False
     point_lights: bool = False
+    spot: bool = False
+    area_meshes: bool = False
+    area_spheres: bool = False
+    area_disks: bool = False
+    area_cylinders: bool = False
     samples_lights: bool = False
+    surfaces: int = 0
+    triangles: bool = False
+    quadrics: bool = False
+    shading_normals: bool = False
+    vertex_uvs: bool = False
+    bsdfs: tuple[str, ...] = ()
+    chromatic_surfaces: bool = False
+    textures: bool = False
+    bitmaps: bool = False
+    material_tables: bool = False
+    reflecting: bool = False
+    samples_at_surfaces: bool = False
+    passable: bool = False
+    transmissive: bool = False
+    boundaries: int = 0
+    camera_inside: bool = False
     filter_table: bool = False
+    signed_filter: bool = False
+    lens: bool = False
     depth_limited: bool = False
     hide_emitters: bool = False
 
     @classmethod
     def from_scene(cls, scene: records.Scene) -> Features:
         """Inspect a scene; the result is a pure function of the records."""
-        media = scene_media(scene)
+        found = find_boundaries(scene)
+        media = [entry.medium for entry in found.entries]
         volumes = [v for m in media for v in medium_volumes(m)]
         emitters = scene.emitters
         homogeneous = [is_homogeneous(m) for m in media]
         kinds = {type(e) for e in emitters}
-        grey_light = all(_emitter_is_grey(e) for e in emitters)
-        shapes = [s for s in scene.shapes if s.interior is not None]
-        bounds = {bounding_kind(s) for s in shapes}
+        surfaces = [scene.shapes[n] for n in found.surfaces]
+        lamps = [s for s in surfaces if s.emission is not None]
+        grey_light = all(_emitter_is_grey(e) for e in emitters) and all(
+            len(set(s.emission)) == 1 for s in lamps
+        )
+        bounds = {bounding_kind(entry.shape) for entry in found.entries if entry.shape is not None}
         emissive = [m for m in media if m.emits]
         lobes = [phase_lobes(m.phase) for m in media]
         phases = {lobe.kind for mixture in lobes for lobe, _ in mixture}
@@ -80,8 +127,8 @@ class Features:
             volumes=len(volumes),
             homogeneous=any(homogeneous),
             heterogeneous=not all(homogeneous),
-            clipped=any(is_clipped(m) for m in media),
-            media_overlap=_may_overlap(shapes),
+            clipped=any(is_clipped(m) for m in media) or _clips_homogeneous(found),
+            media_overlap=may_overlap(scene, found),
             chromatic_extinction=any(not _is_grey(m.sigma_t) or len(set(m.scale)) > 1 for m in media),
             coloured_extinction=any(
                 isinstance(m.sigma_t, records.GridVolume) and channels_of(m.sigma_t) > 1 for m in media
@@ -103,16 +150,41 @@ class Features:
             rayleigh="rayleigh" in phases,
             blend=any(len(mixture) > 1 for mixture in lobes),
             scattering=any(_scatters(m) for m in media),
-            emitters=len(emitters),
+            **_surface_features(scene, found, surfaces, lamps),
+            emitters=len(emitters) + len(lamps),
             constant=records.ConstantEmitter in kinds,
             envmap=records.EnvmapEmitter in kinds,
             directional=records.DirectionalEmitter in kinds,
             point_lights=records.PointEmitter in kinds,
-            samples_lights=bool(emitters) and any(m.sample_emitters for m in media),
+            spot=records.SpotEmitter in kinds,
+            samples_lights=bool(emitters or lamps)
+            and (any(m.sample_emitters for m in media) or bool(surfaces)),
             filter_table=scene.film.rfilter.kind != "box",
+            signed_filter=scene.film.rfilter.kind in SIGNED,
+            lens=scene.sensor.aperture_radius > 0,
             depth_limited=scene.integrator.max_depth >= 0,
             hide_emitters=scene.integrator.hide_emitters,
         )
+
+    @property
+    def area(self) -> bool:
+        """Surfaces that are lights."""
+        return self.area_meshes or self.area_spheres or self.area_disks or self.area_cylinders
+
+    @property
+    def near_lights(self) -> bool:
+        """Lights at a finite distance."""
+        return self.point_lights or self.spot or self.area
+
+    @property
+    def stretches(self) -> bool:
+        """A ray is walked stretch by stretch, from surface to surface or through several media."""
+        return self.media > 1 or (self.media > 0 and self.surfaces > 0)
+
+    @property
+    def boundary_words(self) -> int:
+        """32-bit words that hold a path's bits of the boundaries it is inside of."""
+        return -(-self.boundaries // 32)
 
     def found(self) -> str:
         """One line that names what is there, for the log."""
@@ -121,9 +193,52 @@ class Features:
         )
 
 
-def scene_media(scene: records.Scene) -> list[records.Medium]:
-    """Media of the scene, one per bounding shape, in the order of the shapes."""
-    return [shape.interior for shape in scene.shapes if shape.interior is not None]
+def _surface_features(
+    scene: records.Scene, found: Boundaries, surfaces: list[records.Shape], lamps: list[records.Shape]
+) -> dict[str, object]:
+    """What rays meet beside media."""
+    meshes = [
+        canonical_mesh(s.kind) if s.kind in FLAT else s.mesh for s in surfaces if s.kind not in QUADRICS
+    ]
+    bsdfs = [s.bsdf for s in surfaces]
+    textures = any(bsdf_textures(b) for b in bsdfs)
+    return {
+        "surfaces": len(surfaces),
+        "triangles": bool(meshes),
+        "quadrics": any(s.kind in QUADRICS for s in surfaces),
+        "shading_normals": any(m.normals is not None for m in meshes),
+        "vertex_uvs": any(m.uvs is not None for m in meshes) and (textures or any(map(_turns, bsdfs))),
+        "bsdfs": tuple(sorted(set().union(*(bsdf_kinds(b) for b in bsdfs)))),
+        "chromatic_surfaces": not all(map(is_grey, bsdfs)),
+        "textures": textures,
+        "bitmaps": any(map(has_bitmaps, bsdfs)),
+        "material_tables": any(map(has_tables, bsdfs)),
+        "reflecting": any(map(reflects, bsdfs)),
+        "samples_at_surfaces": any(map(samples_lights, bsdfs)),
+        "passable": any(map(passes_light, bsdfs)),
+        "transmissive": any(map(is_transmissive, bsdfs)),
+        "boundaries": len(found.boundaries),
+        "camera_inside": camera_may_be_inside(scene, found),
+        "area_meshes": any(s.kind not in QUADRICS for s in lamps),
+        "area_spheres": any(s.kind == "sphere" for s in lamps),
+        "area_disks": any(s.kind == "disk" for s in lamps),
+        "area_cylinders": any(s.kind == "cylinder" for s in lamps),
+    }
+
+
+def _turns(bsdf: Bsdf) -> bool:
+    """Whether the direction of its tangents matters."""
+    sides = [side.bsdf for side in bsdf_sides(bsdf) if side is not None]
+    return any(getattr(b, "alpha_u", 0) != getattr(b, "alpha_v", 0) for b in sides)
+
+
+def _clips_homogeneous(found: Boundaries) -> bool:
+    """Boundaries hold a homogeneous medium, which their world box bounds as well: no path strays for ever."""
+    held = {b.interior for b in found.boundaries}
+    return any(
+        e.shape is None and not e.everywhere and e.medium.homogeneous and n in held
+        for n, e in enumerate(found.entries)
+    )
 
 
 def medium_volumes(medium: records.Medium) -> list[records.GridVolume]:
@@ -145,8 +260,8 @@ def is_clipped(medium: records.Medium) -> bool:
 
 
 def bounding_kind(shape: records.Shape) -> str:
-    """What bounds the shape's medium: "cube", "sphere", or "none" where the volume's box, which clips the
-    medium anyway, lies within the shape."""
+    """What bounds the medium in a shape's interval: "cube", "sphere", or "none" where the volume's box, which
+    clips the medium anyway, lies within the shape."""
     medium = shape.interior
     if not is_clipped(medium):
         return shape.kind
@@ -174,24 +289,6 @@ def _emitter_is_grey(emitter: records.Emitter) -> bool:
         records.ConstantEmitter: "radiance",
         records.DirectionalEmitter: "irradiance",
         records.PointEmitter: "intensity",
+        records.SpotEmitter: "intensity",
     }[type(emitter)]
     return len(set(getattr(emitter, value))) == 1
-
-
-def shape_bounds(shape: records.Shape) -> tuple[np.ndarray, np.ndarray]:
-    """Axis-aligned world bounds (lower, upper) of a cube or sphere, float64 (3,)."""
-    linear, centre = shape.to_world[:3, :3], shape.to_world[:3, 3]
-    if shape.kind == "sphere":
-        extent = np.sqrt((linear**2).sum(axis=1))
-    else:
-        extent = np.abs(linear).sum(axis=1)
-    return centre - extent, centre + extent
-
-
-def _may_overlap(shapes: list[records.Shape]) -> bool:
-    """Conservative: whether the world boxes of any two medium bounds intersect."""
-    if len(shapes) < 2:
-        return False
-    lower, upper = (np.array(b) for b in zip(*(shape_bounds(s) for s in shapes), strict=True))
-    meet = ((lower[:, None] < upper[None]) & (upper[:, None] > lower[None])).all(axis=2)
-    return bool(np.triu(meet, 1).any())

@@ -13,6 +13,7 @@ import numpy as np
 from clvol import registry
 from clvol.blackbody import BINS, MIDDLE_KELVIN
 from clvol.config import KernelConfig
+from clvol.scene.materials import BSDFS
 
 _C_TYPES = {"f": "float", "i": "int", "u": "uint"}
 
@@ -36,7 +37,8 @@ VOLUME = _record(
 
 MEDIUM = _record(
     ("shape_from_world", "f", 12),
-    ("shape_kind", "i", 1),  # SHAPE_NONE (the box alone bounds it), SHAPE_CUBE, SHAPE_SPHERE
+    ("shape_kind", "i", 1),  # SHAPE_NONE (the box alone, or boundaries bound it), SHAPE_CUBE, SHAPE_SPHERE
+    ("presence", "i", 1),  # how often it is present outside every boundary
     ("homogeneous", "i", 1),
     ("clipped", "i", 1),  # 1: also bounded by box_lower..box_upper under box_from_world
     ("box_from_world", "f", 12),
@@ -73,8 +75,68 @@ PHASE = _record(
 EMITTER = _record(
     ("kind", "i", 1),  # EMITTER_CONSTANT, …
     ("select_pdf", "f", 1),  # probability that next-event estimation picks it
+    ("cdf", "f", 1),  # of picking it or one from number 1 on that comes before; of number 0: 1
     ("value", "f", 3),  # radiance, irradiance or intensity
-    ("vector", "f", 3),  # direction of travel, or position
+    ("vector", "f", 3),  # direction of travel, position, or a spot's axis
+    ("position", "f", 3),  # of a spot
+    ("cutoff_angle", "f", 1),  # of a spot, radians
+    ("beam_width", "f", 1),  # of a spot, radians
+    ("shape", "i", 1),  # of an area light
+    ("area", "f", 1),
+    ("first", "i", 1),  # of a mesh's entries in `light_faces` and `light_cdf`
+    ("count", "i", 1),
+)
+
+SHAPE = _record(
+    ("kind", "i", 1),  # SURFACE_MESH, SURFACE_SPHERE, SURFACE_DISK, SURFACE_CYLINDER
+    ("flip", "i", 1),  # 1: normals point the other way
+    ("front", "i", 1),  # its material seen from the side of the normal; -1: black
+    ("back", "i", 1),
+    ("emitter", "i", 1),  # its area light, or -1
+    ("boundary", "i", 1),  # number of the boundary of media that it is, or -1
+    ("normals", "i", 1),  # 1: vertices carry normals
+    ("uvs", "i", 1),  # 1: vertices carry (u, v)
+    ("local_from_world", "f", 12),  # of quadrics
+    ("world_from_local", "f", 12),
+)
+
+QUADRIC = _record(
+    ("local_from_world", "f", 12),
+    ("kind", "i", 1),  # QUADRIC_SPHERE, QUADRIC_DISK, QUADRIC_CYLINDER
+    ("shape", "u", 1),
+)
+
+MATERIAL = _record(
+    ("kind", "i", 1),  # MATERIAL_DIFFUSE, …
+    ("opacity", "f", 1),  # of a mask, else 1
+    ("opacity_texture", "i", 1),  # textures: -1 where the number beside it is all
+    ("reflectance", "f", 3),  # diffuse, or the base of a plastic
+    ("reflectance_texture", "i", 1),
+    ("specular", "f", 3),  # specular_reflectance
+    ("specular_texture", "i", 1),
+    ("transmittance", "f", 3),  # specular_transmittance
+    ("transmittance_texture", "i", 1),
+    ("ior", "f", 1),  # int_ior / ext_ior
+    ("eta", "f", 3),  # of a conductor
+    ("k", "f", 3),
+    ("distribution", "i", 1),  # DISTRIBUTION_BECKMANN, DISTRIBUTION_GGX
+    ("alpha_u", "f", 1),
+    ("alpha_v", "f", 1),
+    ("nonlinear", "i", 1),
+    ("inner_reflectance", "f", 1),  # of a plastic's coat, for diffuse light from inside
+    ("specular_weight", "f", 1),  # how often a plastic's coat is sampled, against its base
+    ("table", "i", 1),  # of a rough plastic: first entry in `material_tables`
+)
+
+TEXTURE = _record(
+    ("kind", "i", 1),  # TEXTURE_BITMAP, TEXTURE_CHECKERBOARD
+    ("nearest", "i", 1),
+    ("wrap", "i", 1),  # WRAP_REPEAT, WRAP_MIRROR, WRAP_CLAMP
+    ("first", "u", 1),  # first texel in `texels`, in units of 3 floats
+    ("size", "i", 2),  # width, height
+    ("to_uv", "f", 6),  # two rows of a 2x3 matrix
+    ("color0", "f", 3),
+    ("color1", "f", 3),
 )
 
 ENVMAP = _record(
@@ -107,6 +169,11 @@ RENDER = _record(
     ("camera_base_dy", "f", 3),
     ("camera_forward", "f", 3),
     ("camera_far", "f", 1),  # depth of the far plane beyond the plane rays start from
+    ("lens_x", "f", 3),  # radii of a thin lens, see `clvol.camera`
+    ("lens_y", "f", 3),
+    ("lens_start", "f", 1),
+    ("lens_bend", "f", 1),
+    ("triangles", "u", 1),  # primitives from this number on are quadrics
 )
 
 RECORDS = {
@@ -114,6 +181,10 @@ RECORDS = {
     "Medium": MEDIUM,
     "Phase": PHASE,
     "Emitter": EMITTER,
+    "Shape": SHAPE,
+    "Quadric": QUADRIC,
+    "Material": MATERIAL,
+    "Texture": TEXTURE,
     "Envmap": ENVMAP,
     "Render": RENDER,
 }
@@ -121,9 +192,15 @@ RECORDS = {
 ENUMS = {
     "SHAPE": ("NONE", "CUBE", "SPHERE"),
     "PHASE": ("ISOTROPIC", "HG", "RAYLEIGH"),
-    "EMITTER": ("CONSTANT", "ENVMAP", "DIRECTIONAL", "POINT"),
+    "EMITTER": ("CONSTANT", "ENVMAP", "DIRECTIONAL", "POINT", "SPOT", "AREA"),
+    "SURFACE": ("MESH", "SPHERE", "DISK", "CYLINDER"),
+    "QUADRIC": ("SPHERE", "DISK", "CYLINDER"),
+    "MATERIAL": BSDFS,
+    "DISTRIBUTION": ("BECKMANN", "GGX"),
+    "TEXTURE": ("BITMAP", "CHECKERBOARD"),
+    "WRAP": ("REPEAT", "MIRROR", "CLAMP"),
     "QUEUE": ("GENERATE", "INTERSECT", "MEDIUM", "SHADE", "SHADOW"),
-    "EVENT": ("ESCAPE", "COLLISION"),
+    "EVENT": ("ESCAPE", "COLLISION", "SURFACE"),
     "ABSORPTION": tuple(registry.ABSORPTIONS),
     "PROBABILITY": tuple(registry.PROBABILITIES),
     "CONTROL": ("NEXT_JOB", "JOB_LIMIT", "NON_FINITE", "DONE"),  # DONE: one counter per pass in the ring
@@ -174,19 +251,46 @@ def path_fields(config: KernelConfig) -> list[PathField]:
                 ("violations", "look-ups above their majorant", features.heterogeneous),
             )
         ),
+        PathField(
+            "sample_weight", "f", "what the pixel filter multiplies the result by", features.signed_filter
+        ),
         PathField("channel", "u", "the one channel this path follows", config.one_channel_per_path),
         PathField("pdf", "f", "density of the last direction; 0 where MIS does not apply", config.mis),
-        PathField("medium", "i", "medium of the current interval", features.media > 1),
-        PathField("interval", "u", "walks done since the last scattering", features.media > 1),
-        PathField("entry", "f", "where the current interval was entered", features.media > 1),
-        PathField("interval_start", "f", "ray parameter where the walk starts", features.media > 1),
-        PathField("interval_end", "f", "ray parameter where the walk ends", features.media > 0),
-        PathField("hit_medium", "i", "medium of the nearest collision so far, or -1", features.media_overlap),
-        PathField("hit_distance", "f", "ray parameter of that collision", features.media_overlap),
+        PathField("medium", "i", "medium of the collision", features.media > 1),
+        PathField(
+            "interval_end",
+            "f",
+            "ray parameter where the walk ends",
+            features.media > 0 and not features.stretches,
+        ),
+        PathField("hit_t", "f", "ray parameter of the surface hit, infinite if none", features.surfaces > 0),
+        PathField("hit_primitive", "u", "primitive that was hit", features.surfaces > 0),
+        PathField("hit_u", "f", "where on it", features.triangles),
+        PathField("hit_v", "f", "where on it", features.triangles),
+        PathField("stretch", "u", "surfaces passed since the last scattering", features.passable),
+        PathField("after_t", "f", "ray parameter of the last surface passed", features.passable),
+        PathField("after_primitive", "u", "primitive of the last surface passed", features.passable),
+        *(
+            PathField(f"inside_{word}", "u", "a bit for each boundary the path is inside of")
+            for word in range(features.boundary_words)
+        ),
+        PathField(
+            "eta_squared", "f", "squared index of what the path is in, for roulette", features.transmissive
+        ),
         PathField("shadow_x", "f", "direction to the light", config.nee),
         PathField("shadow_y", "f", "direction to the light", config.nee),
         PathField("shadow_z", "f", "direction to the light", config.nee),
-        PathField("shadow_distance", "f", "distance to the light", config.nee and features.point_lights),
+        PathField("shadow_distance", "f", "distance to the light", config.nee and features.near_lights),
+        *(
+            PathField(
+                f"shadow_origin_{axis}", "f", "start of the shadow ray", config.nee and features.surfaces > 0
+            )
+            for axis in "xyz"
+        ),
+        *(
+            PathField(f"shadow_inside_{word}", "u", "a bit for each boundary it starts inside of", config.nee)
+            for word in range(features.boundary_words)
+        ),
         *(
             PathField(f"shadow_{c}", "f", "unattenuated light of next-event estimation", config.nee)
             for c in spectrum
@@ -258,6 +362,7 @@ def arguments(config: KernelConfig) -> list[Argument]:
         Argument("results", "__global float *"),
         Argument("result_counts", "__global uint *"),
         Argument("media", "__global const Medium *", features.media > 0),
+        Argument("boundary_masks", "__global const uint *", features.boundaries > 0),
         Argument("volumes", "__global const Volume *", features.volumes > 0),
         Argument("tops", "__global const int *", features.volumes > 0),
         Argument("bricks", "__global const float *", features.volumes > 0),
@@ -270,6 +375,20 @@ def arguments(config: KernelConfig) -> list[Argument]:
         Argument("blackbody", "__global const float *", features.temperature),
         Argument("phases", "__global const Phase *", features.scattering),
         Argument("emitters", "__global const Emitter *", features.emitters > 0),
+        Argument("bvh_nodes", "__global const float8 *", features.surfaces > 0),
+        Argument("bvh_triangles", "__global const float8 *", features.surfaces > 0),
+        Argument("quadrics", "__global const Quadric *", features.quadrics),
+        Argument("shapes", "__global const Shape *", features.surfaces > 0),
+        Argument("faces", "__global const uint *", features.triangles),  # 3 vertices and the shape
+        Argument("vertices", "__global const float *", features.triangles),
+        Argument("normals", "__global const float *", features.shading_normals),
+        Argument("uvs", "__global const float *", features.vertex_uvs),
+        Argument("materials", "__global const Material *", features.surfaces > 0),
+        Argument("textures", "__global const Texture *", features.textures),
+        Argument("texels", "__global const float *", features.bitmaps),
+        Argument("material_tables", "__global const float *", features.material_tables),
+        Argument("light_faces", "__global const uint *", features.area_meshes),
+        Argument("light_cdf", "__global const float *", features.area_meshes),
         Argument("envmap", "__global const Envmap *", features.envmap),
         Argument("env_texels", "__global const float *", features.envmap),
         Argument("env_marginal", "__global const float *", features.envmap),
@@ -312,7 +431,23 @@ def layout_text(config: KernelConfig) -> str:
             f"INLINE void set_path_{field.name}({slot}, {c_type} value) {{ {at} = {put}; }}",
         ]
     parts += _counts_text(config)
+    parts += _inside_text(config)
     return "\n".join(parts) + "\n"
+
+
+def _inside_text(config: KernelConfig) -> list[str]:
+    """How a path's bits of boundaries, and its shadow ray's, are read and written as an Inside."""
+    words, slot = config.features.boundary_words, "const Scene *scene, uint slot"
+    prefixes = ("inside", "shadow_inside") if config.nee else ("inside",)
+    parts = [f"typedef struct {{ uint word[{max(words, 1)}]; }} Inside;"]
+    for prefix in prefixes:
+        read = " ".join(f"inside.word[{w}] = path_{prefix}_{w}(scene, slot);" for w in range(words))
+        write = " ".join(f"set_path_{prefix}_{w}(scene, slot, inside.word[{w}]);" for w in range(words))
+        parts += [
+            f"INLINE Inside get_{prefix}({slot}) {{ Inside inside; {read} return inside; }}",
+            f"INLINE void set_{prefix}({slot}, Inside inside) {{ {write} }}",
+        ]
+    return parts
 
 
 def _counts_text(config: KernelConfig) -> list[str]:

@@ -11,16 +11,11 @@ import numpy as np
 from clvol.accel import choice, controls
 from clvol.accel.bounds import Bounds, with_slack
 from clvol.accel.kdtree import KdTree, build_kdtree, pack_maximum, tree_lattice, unpack_maximum
+from clvol.boundaries import Boundaries, find_boundaries, shape_bounds
 from clvol.errors import SceneError
-from clvol.features import (
-    Features,
-    is_clipped,
-    is_homogeneous,
-    medium_volumes,
-    scene_media,
-    shape_bounds,
-)
+from clvol.features import Features, is_clipped, is_homogeneous, medium_volumes
 from clvol.scene import records
+from clvol.surfaces import Surfaces, prepare_surfaces
 from clvol.volumes.bricks import BOUND_CELLS, BrickMap, build_bricks
 from clvol.volumes.grid import DenseGrid
 
@@ -85,14 +80,17 @@ class PreparedMajorant:
 class PreparedScene:
     """Everything about a scene that can be worked out without a device.
 
+    boundaries : which shapes are surfaces, and what bounds media.  surfaces : None where there are none.
     majorant : the chosen kind, "none" where no medium is heterogeneous.
     volumes, majorants : by id() of the GridVolume and of the Medium, which the scene keeps alive.
     """
 
     scene: records.Scene
     features: Features
+    boundaries: Boundaries
     centre: np.ndarray
     radius: float
+    surfaces: Surfaces | None
     volumes: dict[int, PreparedVolume]
     needs: MajorantNeeds
     majorant: str
@@ -106,21 +104,28 @@ def prepare(scene: records.Scene, needs: MajorantNeeds | None = None) -> Prepare
     """
     needs = needs or MajorantNeeds()
     features = Features.from_scene(scene)
-    centre, radius = _scene_sphere(scene)
+    found = find_boundaries(scene)
+    centre, radius = _scene_sphere(scene, found)
     volumes = {}
-    for medium in scene_media(scene):
+    for medium in (entry.medium for entry in found.entries):
         for volume in medium_volumes(medium):
             if id(volume) not in volumes:
                 volumes[id(volume)] = _prepare_volume(volume, centre)
         _check_cover(medium)
-    media = [m for m in scene_media(scene) if not is_homogeneous(m)]
+    media = [e.medium for e in found.entries if not is_homogeneous(e.medium)]
     majorant, majorants = _choose_majorants(media, volumes, needs)
-    return PreparedScene(scene, features, centre, radius, volumes, needs, majorant, majorants)
+    surfaces = prepare_surfaces(scene, found, centre)
+    return PreparedScene(
+        scene, features, found, centre, radius, surfaces, volumes, needs, majorant, majorants
+    )
 
 
-def _scene_sphere(scene: records.Scene) -> tuple[np.ndarray, float]:
-    """Centre and radius of a sphere round every medium: what rays can meet (else the camera's place)."""
-    corners = [corner for s in scene.shapes if s.interior is not None for corner in shape_bounds(s)]
+def _scene_sphere(scene: records.Scene, found: Boundaries) -> tuple[np.ndarray, float]:
+    """Centre and radius of a sphere round every medium and surface: what rays can meet (else the camera's
+    place)."""
+    shapes = [scene.shapes[n] for n in found.surfaces]
+    shapes += [e.shape for e in found.entries if e.shape is not None]
+    corners = [corner for s in shapes for corner in shape_bounds(s)]
     if not corners:
         return scene.sensor.to_world[:3, 3].copy(), 1.0
     lower, upper = np.min(corners, axis=0), np.max(corners, axis=0)

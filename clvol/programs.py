@@ -17,6 +17,7 @@ from clvol import layout, registry
 from clvol.config import KernelConfig
 from clvol.device import Device
 from clvol.errors import DeviceError
+from clvol.material_table import BSDF_HEADERS
 
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"')
 BUILD_OPTIONS = ("-cl-std=CL1.2", "-w")
@@ -76,15 +77,49 @@ def stage_headers(config: KernelConfig, stage: str) -> list[str]:
     if walks and features.homogeneous:
         analytic = "homogeneous" if stage == "medium_sample" else "homogeneous_transmittance"
         headers.append(f"tracking/{analytic}.h")
+    materials = features.surfaces and (
+        stage == "shade" or (stage == "shadow_transmittance" and features.passable)
+    )
+    if materials:
+        headers += [*(["texture/texture.h"] if features.textures else []), *bsdf_headers(features.bsdfs)]
     if stage == "shade":
         if features.scattering:
             headers.append("phase/phase.h")
+        if features.area:
+            headers += ["geometry/surface.h", "emitter/area.h"]
         if features.envmap:
             headers.append("emitter/envmap.h")
         headers.append("emitter/emitter.h")
-    if stage in ("intersect", "shadow_transmittance") and features.media:
+    return headers + geometry_headers(config, stage)
+
+
+def geometry_headers(config: KernelConfig, stage: str) -> list[str]:
+    """Headers of what a stage knows of surfaces and of where media are."""
+    features = config.features
+    headers = []
+    crosses = {
+        "intersect": features.camera_inside,
+        "shade": features.surfaces > 0,
+        "shadow_transmittance": features.passable,
+    }
+    if features.surfaces and stage in crosses:
+        headers.append("geometry/bvh.h")
+        if stage != "shadow_transmittance":
+            headers.append("stages/hit.h")
+        if crosses[stage]:
+            headers += ["geometry/surface.h", "stages/boundary.h"]
+        if crosses[stage] and stage != "intersect":
+            headers.append("stages/side.h")
+    if features.media and stage in ("intersect", "medium_sample", "shadow_transmittance"):
         headers.append("geometry/interval.h")
+        if features.stretches or stage == "shadow_transmittance":
+            headers.append("stages/media.h")
     return headers
+
+
+def bsdf_headers(kinds: tuple[str, ...]) -> list[str]:
+    """Headers of the BSDFs that a scene uses, and the one that chooses among them."""
+    return [BSDF_HEADERS[kind] for kind in kinds if kind in BSDF_HEADERS] + ["bsdf/bsdf.h"]
 
 
 def compose(config: KernelConfig, headers: list[str], body: str) -> str:

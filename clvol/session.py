@@ -20,7 +20,7 @@ from clvol.programs import build_stages
 from clvol.progress import Progress, ProgressCallback
 from clvol.result import Result, mean_and_variance, relative_noise
 from clvol.scene.digest import scene_digest
-from clvol.upload import emitter_order, upload_scene
+from clvol.upload import upload_scene
 from clvol.version import __version__
 from clvol.wavefront import Pool, Progressed, Wavefront
 
@@ -157,7 +157,7 @@ class Session:
     def result(self, first: int, count: int, setup_seconds: float) -> Result:
         """The film as a Result, with what it cost."""
         film = self.prepared.scene.film
-        shape = (film.height, film.width)
+        shape = film.window[3], film.window[2]
         sums = [np.broadcast_to(s, (len(s), 3)).reshape(*shape, 3).copy() for s in self.wavefront.sums()]
         stats = self._statistics(count, setup_seconds)
         metadata = {
@@ -261,12 +261,14 @@ def render_record(prepared: PreparedScene, seed: int) -> np.ndarray:
     """The Render record, schedule fields left at 0."""
     scene = prepared.scene
     record = np.zeros(1, layout.RENDER)
-    record["film_size"] = scene.film.width, scene.film.height
+    record["film_size"] = scene.film.window[2:]
     record["seed"] = seed & 0xFFFFFFFF, seed >> 32
     record["max_depth"] = scene.integrator.max_depth & 0xFFFFFFFF
     record["rr_depth"] = scene.integrator.rr_depth
-    record["emitters"] = len(emitter_order(scene))
+    record["emitters"] = prepared.features.emitters
     record["media"] = prepared.features.media
+    if prepared.surfaces is not None:
+        record["triangles"] = len(prepared.surfaces.faces)
     record["filter_radius"] = scene.film.rfilter.radius
     record["filter_bins"] = FILTER_BINS
     record["sample_border"] = int(scene.film.sample_border)
@@ -279,6 +281,10 @@ def render_record(prepared: PreparedScene, seed: int) -> np.ndarray:
         "camera_base_dx": rays.base_dx,
         "camera_base_dy": rays.base_dy,
         "camera_forward": rays.forward,
+        "lens_x": rays.lens_x,
+        "lens_y": rays.lens_y,
+        "lens_start": rays.lens_start,
+        "lens_bend": rays.lens_bend,
     }.items():
         record[field] = value
     record["camera_far"] = rays.far

@@ -235,9 +235,9 @@ def test_homogeneous_media_of_several_colours_follow_all_channels(device):
     assert (config.channels, config.spectrum, config.extinction) == (3, 3, 3)
 
 
-def test_overlapping_media_of_several_colours_follow_one_channel(device):
+def test_overlapping_media_of_several_colours_follow_all_channels(device):
     config = config_of(device, scene([fog((0.5, 1.0, 1.5)), fog()], [SUN]))
-    assert (config.channels, config.spectrum, config.extinction) == (3, 1, 1)
+    assert (config.channels, config.spectrum, config.extinction) == (3, 3, 3)
 
 
 def test_a_grey_medium_of_coloured_albedo_follows_all_channels_unless_absorption_is_sampled(device):

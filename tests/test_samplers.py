@@ -8,18 +8,16 @@ Everything else is compared in float64.  Phase functions have test_phases.py.
 from dataclasses import replace
 
 import numpy as np
-import pyopencl as cl
 import pytest
+from camera_paths import start_paths
 from pictures import gauss
 from probe import Probe, medium_of, scene_of
 from sampling import DRAWS, RANDOM, uniform_p_value, uniforms
 from stat_tests import FALSE_ALARM, chi2_p_value
 
 import clvol
-from clvol import layout
 from clvol.camera import camera_rays
 from clvol.scene.records import EnvmapEmitter, Film, Perspective, ReconstructionFilter
-from clvol.session import render_record
 
 
 def bare_scene(**film):
@@ -362,7 +360,7 @@ def filter_probe(request, device):
 def test_pixel_offsets_follow_the_filter_cut_at_the_films_edge(filter_probe, sample_border, pixel, pixels):
     rfilter, probes = filter_probe
     out = np.zeros(DRAWS, np.float32)
-    body = RANDOM + f"out0[i] = filter_offset(scene, k.x, {pixel}, {pixels});"
+    body = RANDOM + f"float weight = 1.0f; out0[i] = filter_offset(scene, k.x, {pixel}, {pixels}, &weight);"
     probes[sample_border].run(["stages/path.h", "stages/generate.h"], body, [out])
     offset = out.astype(float) - 0.5  # from the pixel's centre
     edges = np.linspace(-rfilter.radius, rfilter.radius, 65)
@@ -476,27 +474,9 @@ def test_camera_rays_are_mitsubas(name):
 def test_paths_start_on_mitsubas_rays_at_the_offsets_drawn(device, name):
     """Every path that `start_job` starts lies in its own pixel of Mitsuba's image plane."""
     film, sensor, expected = film_and_sensor(name)
-    scene = replace(bare_scene(), film=film, sensor=sensor)
-    probe = Probe(device, scene)
-    record = render_record(probe.prepared, seed=1)
     samples, pixels = 500, film.width * film.height
-    record["pass_samples"], record["pass_jobs"], record["ring_passes"] = samples, samples * pixels, 1
-    record["last_pass"], record["last_samples"] = 0, samples
-    flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
-    probe.buffers["render"] = cl.Buffer(device.context, flags, hostbuf=record)
-    fields = layout.path_fields(probe.config)
-    state = np.zeros((len(fields), samples * pixels), np.uint32)
-    jobs = np.zeros(samples * pixels, np.uint32)
-    body = """
-        Scene with_state = *scene;
-        with_state.state = out1;
-        with_state.slot_stride = count;
-        start_job(&with_state, i, i);
-        out0[i] = path_pixel(&with_state, i);"""
-    probe.run(["stages/path.h", "stages/generate.h"], body, [jobs, state])
-    values = {f.name: state[n].view(np.float32).astype(float) for n, f in enumerate(fields) if f.kind == "f"}
-    d = np.stack([values[f"direction_{a}"] for a in "xyz"], axis=1)
-    o = np.stack([values[f"origin_{a}"] for a in "xyz"], axis=1) + probe.prepared.centre
+    started = start_paths(device, replace(bare_scene(), film=film, sensor=sensor), samples)
+    d, o, jobs = started.direction, started.origin, started.pixel
     # where the ray meets the image plane, from the corners of Mitsuba's film
     a, _, c = expected / (expected @ VIEW[:3, 2])[:, None]
     local, corners = d @ VIEW[:3, :3], np.array([a, c]) @ VIEW[:3, :3]

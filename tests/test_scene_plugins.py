@@ -11,6 +11,7 @@ import pytest
 
 from clvol.errors import Error, SceneError, VolumeError
 from clvol.scene import load_dict, load_file, rotate, scale, translate
+from clvol.scene.materials import Diffuse
 from clvol.scene.records import ConstantEmitter, ConstVolume, Film, Integrator, Phase, ReconstructionFilter
 from clvol.volumes import SparseGrid, write_vol
 
@@ -111,6 +112,10 @@ def test_defaults_are_mitsubas():
         ({"type": "tent"}, ReconstructionFilter("tent", 1.0, 0.0)),
         ({"type": "tent", "radius": 2.0}, ReconstructionFilter("tent", 2.0, 0.0)),
         ({"type": "gaussian", "stddev": 0.7}, ReconstructionFilter("gaussian", 2.8, 0.7)),
+        ({"type": "mitchell"}, ReconstructionFilter("mitchell", 2.0, 0.0, 1 / 3, 1 / 3)),
+        ({"type": "mitchell", "B": 1, "C": 0}, ReconstructionFilter("mitchell", 2.0, 0.0, 1.0, 0.0)),
+        ({"type": "catmullrom"}, ReconstructionFilter("mitchell", 2.0, 0.0, 0.0, 0.5)),
+        ({"type": "lanczos"}, ReconstructionFilter("lanczos", 3.0, 0.0)),
     ],
 )
 def test_filter_radii_are_mitsubas(given, expected):
@@ -121,6 +126,45 @@ def test_the_integrator_carries_choices():
     choices = {"technique": "delta", "majorant": "grid", "probability": "history", "control": "mean"}
     loaded = load(integrator={"type": "volpath", "rr_depth": 9} | choices).integrator
     assert loaded == Integrator(-1, 9, False, choices)
+
+
+def test_path_and_moment_are_volpath_where_they_can_be():
+    limits = {"max_depth": 7, "rr_depth": 3, "hide_emitters": True}
+    path = {"type": "path"} | limits
+    assert load(integrator=path).integrator == Integrator(7, 3, True, {})
+    assert load(integrator={"type": "moment", "inner": path}).integrator == Integrator(7, 3, True, {})
+    medium = {"type": "homogeneous"}
+    fog = {"type": "cube", "bsdf": {"type": "null"}, "exterior": medium}
+    for integrator in (path, {"type": "moment", "inner": path}):
+        message = error_of(integrator=integrator, fog=fog)
+        assert "scene.integrator: integrator 'path' sees no media" in message
+        assert "(shape 'fog'); use volpath" in message
+    load(integrator={"type": "moment", "inner": {"type": "volpath"}}, fog=fog)
+    assert "holds another one, this one is empty" in error_of(integrator={"type": "moment"})
+    two = {"type": "moment", "a": {"type": "path"}, "b": {"type": "volpath"}}
+    assert "takes one integrator, got 2" in error_of(integrator=two)
+    assert "unknown parameter 'technique'" in error_of(integrator={"type": "path", "technique": "delta"})
+
+
+def test_thin_lenses_are_perspective_cameras_with_an_aperture():
+    lens = load({"type": "thinlens", "aperture_radius": 0.2, "far_clip": 50, "fov_axis": "y"}).sensor
+    assert (lens.aperture_radius, lens.focus_distance) == (0.2, 50.0)  # Mitsuba: in focus at the far plane
+    assert (lens.fov, lens.fov_axis, lens.near_clip) == (40.0, "y", 0.01)
+    assert load({"type": "thinlens", "aperture_radius": 0, "focus_distance": 3}).sensor.aperture_radius == 0
+
+
+def test_a_crop_is_a_window_of_the_film():
+    crop = {"crop_offset_x": 2, "crop_offset_y": 1, "crop_width": 3, "crop_height": 2}
+    film = load({"film": {"type": "hdrfilm", "width": 6, "height": 4} | crop}).film
+    assert (film.width, film.height, film.crop, film.window) == (6, 4, (2, 1, 3, 2), (2, 1, 3, 2))
+    assert load({"film": {"type": "hdrfilm", "width": 6, "height": 4, "crop_width": 5}}).film.crop == (
+        0,
+        0,
+        5,
+        4,
+    )
+    whole = load({"film": {"type": "hdrfilm", "width": 6, "height": 4, "crop_width": 6}}).film
+    assert (whole.crop, whole.window) == (None, (0, 0, 6, 4))
 
 
 @pytest.mark.parametrize(
@@ -142,11 +186,26 @@ def test_the_integrator_carries_choices():
         ({"film": {"type": "hdrfilm", "width": 65537}}, "from 1 to 65536"),
         ({"film": {"type": "hdrfilm", "width": 65536, "height": 65536}}, "too large"),
         ({"film": {"type": "hdrfilm", "width": 64.0}}, "must be an integer"),
-        ({"film": {"type": "hdrfilm", "crop_width": 64}}, "not supported in this version"),
+        ({"film": {"type": "hdrfilm", "crop_width": 769}}, "crop_width 769 exceed its width 768"),
+        ({"film": {"type": "hdrfilm", "crop_offset_y": 1}}, "crop_offset_y: the crop window reaches beyond"),
+        ({"film": {"type": "hdrfilm", "crop_height": 0}}, "from 1 to"),
+        ({"film": {"type": "hdrfilm", "crop_offset_x": -1}}, "from 0 to"),
         ({"film": {"type": "hdrfilm", "pixel_format": "rgba"}}, "'rgba' is not supported"),
         (
-            {"film": {"type": "hdrfilm", "rfilter": {"type": "mitchell"}}},
-            "rfilter 'mitchell' is not supported",
+            {"film": {"type": "hdrfilm", "rfilter": {"type": "mitchell", "B": 1.5}}},
+            "'B' of rfilter 'mitchell' must be in [0, 1]",
+        ),
+        (
+            {"film": {"type": "hdrfilm", "rfilter": {"type": "mitchell", "b": 0.5}}},
+            "unknown parameter 'b'",
+        ),
+        ({"film": {"type": "hdrfilm", "rfilter": {"type": "lanczos", "lobes": 0}}}, "from 1 to 16"),
+        ({"type": "thinlens"}, "a thinlens needs an aperture_radius"),
+        ({"type": "thinlens", "aperture_radius": -1}, "finite and >= 0"),
+        ({"type": "thinlens", "aperture_radius": 1, "focus_distance": 0}, "finite and > 0"),
+        (
+            {"type": "thinlens", "aperture_radius": 1, "principal_point_offset_x": 0.1},
+            "unknown parameter 'principal_point_offset_x'",  # as in Mitsuba
         ),
         (
             {"film": {"type": "hdrfilm", "rfilter": {"type": "box", "radius": 2.0}}},
@@ -361,19 +420,35 @@ def test_a_spheres_center_and_radius_apply_before_to_world():
 @pytest.mark.parametrize(
     ("shape", "message"),
     [
-        ({"type": "cube"}, "without a BSDF is diffuse, which is not supported"),
-        ({"type": "cube", "bsdf": {"type": "diffuse"}}, "scene.s.bsdf: bsdf 'diffuse' is not supported"),
+        (
+            {"type": "cube", "bsdf": {"type": "principled"}},
+            "scene.s.bsdf: bsdf 'principled' is not supported",
+        ),
         ({"type": "cube", "bsdf": {"type": "nul"}}, "unknown plugin 'nul'; did you mean 'null'?"),
         (
-            {"type": "obj", "filename": "a.obj"},
-            "shape 'obj' is not supported in this version; supported: cube, sph",
+            {"type": "serialized", "filename": "a.serialized"},
+            "shape 'serialized' is not supported in this version; supported: cube, sph",
         ),
         ({"type": "torus"}, "scene.s: unknown plugin 'torus'"),
-        ({"type": "cube", "exterior": {"type": "homogeneous"}}, "exterior medium is not supported"),
-        ({"type": "cube", "inside": {"type": "homogeneous"}}, "must be its 'interior'"),
-        ({"type": "cube", "light": {"type": "area"}}, "emitter 'area' is not supported"),
-        ({"type": "cube", "light": {"type": "point"}}, "takes no emitter 'point'"),
-        ({"type": "cube", "flip_normals": True}, "flip_normals is not supported"),
+        ({"type": "cube", "inside": {"type": "homogeneous"}}, "must be its 'interior' or 'exterior'"),
+        ({"type": "cube", "light": {"type": "point"}}, "scene.s.light: a shape takes no emitter 'point'"),
+        ({"type": "cube", "a": {"type": "area"}, "b": {"type": "area"}}, "takes one emitter, got 2"),
+        ({"type": "cube", "light": {"type": "area", "to_world": scale(2)}}, "unknown parameter 'to_world'"),
+        ({"type": "cube", "light": {"type": "area", "radiance": -1.0}}, "finite and >= 0"),
+        (
+            {"type": "cube", "light": {"type": "area", "radiance": {"type": "checkerboard"}}},
+            "scene.s.light.radiance: the radiance of an area emitter cannot vary over the shape",
+        ),
+        ({"type": "cube", "eye": {"type": "perspective"}}, "shape 'cube' takes no sensor ('perspective')"),
+        ({"type": "cube", "a": {"type": "null"}, "b": {"type": "null"}}, "takes one bsdf, got 2"),
+        ({"type": "cube", "flip_normals": 1}, "must be true or false"),
+        ({"type": "disk", "face_normals": True}, "unknown parameter 'face_normals'"),  # as in Mitsuba
+        ({"type": "cylinder", "radius": 0}, "must be finite and > 0"),
+        ({"type": "cylinder", "p1": [0, 0, 0]}, "scene.s.p1: p0 and p1 are the same point"),
+        (
+            {"type": "cylinder", "to_world": scale([2, 1, 1]), "light": {"type": "area"}},
+            "to_world of a cylinder that emits must not stretch",
+        ),
         ({"type": "sphere", "radius": 0}, "must be finite and > 0"),
         ({"type": "sphere", "radius": -1}, "must be finite and > 0"),
         ({"type": "sphere", "center": [1, 2]}, "three finite numbers"),
@@ -386,7 +461,71 @@ def test_other_shapes_are_errors(shape, message):
     assert message in error_of(s=shape)
 
 
+@pytest.mark.parametrize(
+    ("ends", "uv", "hit"),  # where rays hit Mitsuba's cylinders of radius ½
+    [
+        (([1, 0, 0], [3, 0, 0]), (0.4345, 0.5), (2, 0.2, 0.45825757)),
+        (([0, 0, 0], [0, 2, 0]), (0.7820, 0.1), (0.1, 0.2, 0.48989795)),
+        (([0, 0, 2], [0, 0, 0]), (0.7820, 0.9), (0.1, 0.48989795, 0.2)),
+    ],
+)
+def test_cylinders_run_from_p0_to_p1_with_mitsubas_seam(ends, uv, hit):
+    shape = load(s={"type": "cylinder", "p0": ends[0], "p1": ends[1], "radius": 0.5}).shapes[0]
+    angle = 2 * np.pi * uv[0]
+    on_unit_cylinder = [np.cos(angle), np.sin(angle), uv[1], 1]
+    np.testing.assert_allclose((shape.to_world @ on_unit_cylinder)[:3], hit, atol=3e-4)
+
+
+def test_cylinders_that_emit_may_be_scaled_and_others_stretched():
+    light = {"light": {"type": "area"}}
+    load(s={"type": "cylinder", "p1": [1, 1, 0], "to_world": rotate([1, 2, 3], 50) @ scale(3)} | light)
+    load(s={"type": "cylinder", "to_world": scale([2, 2, 5])} | light)
+    stretched = load(s={"type": "cylinder", "to_world": scale([2, 1, 1])}).shapes[0]
+    np.testing.assert_array_equal(stretched.to_world, scale([2, 1, 1]))
+
+
+def reflectance(shape):
+    """Of a shape that is diffuse."""
+    assert isinstance(shape.bsdf, Diffuse)
+    return shape.bsdf.reflectance
+
+
+@pytest.mark.parametrize("kind", ["sphere", "cube", "rectangle", "disk", "cylinder"])
+def test_shapes_are_diffuse_unless_told_otherwise(kind, caplog):
+    """As Mitsuba has it: also those with a medium, and black those that emit."""
+    plain = load(s={"type": kind, "to_world": scale(2), "flip_normals": True}).shapes[0]
+    assert (plain.kind, reflectance(plain), plain.emission) == (kind, (0.5,), None)
+    assert plain.flip_normals
+    np.testing.assert_array_equal(plain.to_world, scale(2))
+    assert not caplog.text
+    fog = {"type": "homogeneous"}
+    full = load(s={"type": kind, "interior": fog, "exterior": fog | {"sigma_t": 3.0}}).shapes[0]
+    assert reflectance(full) == (0.5,)
+    assert (full.interior.sigma_t.value, full.exterior.sigma_t.value) == ((1.0,), (3.0,))
+    assert "scene.s: the shape has a medium but no BSDF, so it is diffuse and hides the medium" in caplog.text
+
+
+def test_an_area_emitter_makes_its_shape_a_light():
+    light = {"type": "area", "radiance": {"type": "rgb", "value": [1, 2, 3]}}
+    lamp = load(s={"type": "disk", "light": light}).shapes[0]
+    assert (lamp.emission, reflectance(lamp)) == ((1.0, 2.0, 3.0), (0.0,))
+    white = load(s={"type": "disk", "light": {"type": "area"}, "bsdf": {"type": "diffuse"}}).shapes[0]
+    assert (white.emission, reflectance(white)) == ((1.0,), (0.5,))
+    assert error_of(light=light) == (
+        "scene.light: an area emitter outside a shape lights nothing; put it into the shape that emits"
+    )
+
+
 # -- emitters --------------------------------------------------------------------------------------
+
+
+def test_spots_fade_from_three_quarters_of_their_cutoff():
+    spot = emitter(type="spot", cutoff_angle=40, intensity=5, to_world=translate([1, 2, 3]) @ scale(2))
+    assert (spot.cutoff_angle, spot.beam_width, spot.intensity) == (40.0, 30.0, (5.0,))
+    np.testing.assert_array_equal(spot.to_world @ [0, 0, 0, 1], [1, 2, 3, 1])
+    plain = emitter(type="spot")
+    assert (plain.cutoff_angle, plain.beam_width, plain.intensity) == (20.0, 15.0, (1.0,))
+    assert emitter(type="spot", beam_width=20).beam_width == 20.0
 
 
 def test_light_travels_along_local_z_or_the_direction():
@@ -464,7 +603,18 @@ def test_8_bit_envmaps_are_srgb_decoded(tmp_path):
         ({"type": "directional", "direction": [0, 0, 1], "to_world": np.eye(4)}, "not both"),
         ({"type": "point", "position": [0, 0, np.nan]}, "three finite numbers"),
         ({"type": "point", "position": [0, 0, 1], "to_world": np.eye(4)}, "not both"),
-        ({"type": "spot"}, "emitter 'spot' is not supported in this version; supported: constant, envmap"),
+        (
+            {"type": "sunsky"},
+            "emitter 'sunsky' is not supported in this version; supported: constant, envmap",
+        ),
+        ({"type": "spot", "cutoff_angle": 0}, "leaves no light"),
+        ({"type": "spot", "cutoff_angle": 200}, "in [0, 180]"),
+        ({"type": "spot", "beam_width": 21}, "beam_width (21) must not exceed cutoff_angle (20)"),
+        ({"type": "spot", "to_world": scale([1, 1, 2])}, "must not stretch"),
+        (
+            {"type": "spot", "texture": {"type": "checkerboard"}},
+            "'texture' of emitter 'spot' is not supported",
+        ),
         (
             {"type": "constant", "radiance": {"type": "bitmap", "filename": "a.png"}},
             "must be a number, an rgb",
@@ -524,7 +674,7 @@ def test_a_dict_inside_itself_is_an_error():
 
 
 def test_unused_plugins_are_checked_too():
-    assert "bsdf 'diffuse' is not supported" in error_of(paint={"type": "diffuse"})
+    assert "bsdf 'principled' is not supported" in error_of(paint={"type": "principled"})
 
 
 def test_parameters_without_effect_are_accepted():

@@ -2,11 +2,8 @@
 #ifndef CLVOL_EMITTER_H
 #define CLVOL_EMITTER_H
 #include "core/sampling.h"
-
-INLINE float3 emitter_value(__global const Emitter *emitter)
-{
-    return (float3)(emitter->value[0], emitter->value[1], emitter->value[2]);
-}
+#include "emitter/light_sample.h"
+#include "emitter/spot.h"
 
 /* Radiance of the environment seen along `direction`, and the density with which next-event
    estimation would have chosen that direction.  There is at most one environment, the first emitter. */
@@ -25,24 +22,43 @@ INLINE float3 environment(const Scene *scene, float3 direction, float *pdf)
 #endif
 
 #if CLVOL_NEE
-typedef struct {
-    float3 direction; /* towards the light */
-    float distance;
-    float3 value; /* light arriving, over the probability of this choice */
-    float pdf;    /* of the direction, choice of light included; 0: no other way to find it (no MIS) */
-} LightSample;
+/* The light that the uniform number `choice` picks, and in `choice` what is left of it, uniform again.  Emitters
+   after the first hold the lower part of the unit interval, the weakest lowest, where floats are finest; the first
+   has what is above them. */
+INLINE __global const Emitter *choose_emitter(const Scene *scene, float *choice)
+{
+    const uint count = scene->render->emitters;
+    uint lower = 1, upper = count;
+    while (lower < upper) {
+        const uint middle = (lower + upper) >> 1;
+        if (scene->emitters[middle].cdf > *choice)
+            upper = middle;
+        else
+            lower = middle + 1;
+    }
+    __global const Emitter *emitter = scene->emitters + (lower < count ? lower : 0);
+    const float left = (*choice - (emitter->cdf - emitter->select_pdf)) / emitter->select_pdf;
+    *choice = clamp_to(left, 0.0f, 0x1.fffffep-1f);
+    return emitter;
+}
 
+/* One direction towards one light; `choice`, u and v are uniform in [0, 1). */
 INLINE LightSample sample_light(const Scene *scene, float3 from, float choice, float u, float v)
 {
-    uint index = 0;
-    __global const Emitter *emitter = scene->emitters;
-    while (index + 1 < scene->render->emitters && choice >= emitter->select_pdf) {
-        choice -= emitter->select_pdf;
-        ++index, ++emitter;
-    }
+    __global const Emitter *emitter = choose_emitter(scene, &choice);
     LightSample light;
     light.distance = INFINITY;
     light.pdf = 0.0f;
+#if CLVOL_HAS_AREA
+    if (emitter->kind == EMITTER_AREA) {
+        sample_area(scene, emitter, from, choice, u, v, &light);
+        return light;
+    }
+#endif
+    if (CLVOL_HAS_SPOT && emitter->kind == EMITTER_SPOT) {
+        sample_spot(emitter, from, &light);
+        return light;
+    }
     if (CLVOL_HAS_DIRECTIONAL && emitter->kind == EMITTER_DIRECTIONAL) {
         light.direction = -(float3)(emitter->vector[0], emitter->vector[1], emitter->vector[2]);
         light.value = emitter_value(emitter) / emitter->select_pdf;

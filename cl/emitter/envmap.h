@@ -5,6 +5,7 @@
    distributions, inverted by bisection, so that stratified numbers stay stratified. */
 #ifndef CLVOL_EMITTER_ENVMAP_H
 #define CLVOL_EMITTER_ENVMAP_H
+#include "emitter/cdf.h"
 
 /* Fractional column (in cells between texel centres, 0..W) and row (0..H-1) of a world direction. */
 INLINE float2 envmap_position(const Scene *scene, float3 direction)
@@ -29,20 +30,6 @@ INLINE float3 envmap_radiance(const Scene *scene, float3 direction)
     const float3 b0 = vload3((size_t)(y0 + 1) * width + x0, t), b1 = vload3((size_t)(y0 + 1) * width + x1, t);
     const float3 a = (a1 - a0) * fx + a0, b = (b1 - b0) * fx + b0;
     return (b - a) * fy + a;
-}
-
-/* First index i in [0, n) with cdf[i + 1] > u; cdf has n + 1 entries from 0 to 1. */
-INLINE int cdf_search(__global const float *cdf, int n, float u)
-{
-    int lower = 0, upper = n - 1;
-    while (lower < upper) {
-        const int middle = (lower + upper) >> 1;
-        if (cdf[middle + 1] > u)
-            upper = middle;
-        else
-            lower = middle + 1;
-    }
-    return lower;
 }
 
 /* pdf in solid angle of the cell (x, y), at a sine of the polar angle. */

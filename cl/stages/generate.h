@@ -8,7 +8,11 @@ INLINE void write_result(const Scene *scene, uint slot, uint job)
 {
     const uint ring_jobs = scene->render->pass_jobs * scene->render->ring_passes;
     const uint place = job % ring_jobs;
+#if CLVOL_HAS_SIGNED_FILTER
+    const Spectrum radiance = path_sample_weight(scene, slot) * get_radiance(scene, slot);
+#else
     const Spectrum radiance = get_radiance(scene, slot);
+#endif
 #if CLVOL_SPECTRUM == 1
     scene->results[place] = radiance;
 #else
@@ -18,36 +22,63 @@ INLINE void write_result(const Scene *scene, uint slot, uint job)
     atomic_inc(scene->control + CONTROL_DONE + place / scene->render->pass_jobs);
 }
 
-/* Offset of the sample from the pixel's corner along one axis, drawn from the pixel filter; a filter
-   that reaches over the film's edge is cut there and renormalised. */
-INLINE float filter_offset(const Scene *scene, uint k, int pixel, int pixels)
+/* Offset of the sample from the pixel's corner along one axis, drawn from the pixel filter's magnitude; a filter
+   that reaches over the window's edge is cut there and renormalised.  A filter f with negative parts multiplies
+   `weight` by sign(f) times the integral of |f| over that of f. */
+INLINE float filter_offset(const Scene *scene, uint k, int pixel, int pixels, float *weight)
 {
 #if CLVOL_HAS_FILTER_TABLE
+    __global const float *cdf = scene->filter_cdf;
     const int bins = scene->render->filter_bins;
     const float radius = scene->render->filter_radius;
     const float per_unit = (float)bins / (2.0f * radius);
     float lower = 0.0f, upper = 1.0f;
+    float net = CLVOL_HAS_SIGNED_FILTER ? cdf[2 * bins + 1] : 1.0f; /* integral of the filter itself */
     if (!scene->render->sample_border) {
         const float from = clamp_to((radius - 0.5f - (float)pixel) * per_unit, 0.0f, (float)bins);
         const float to = clamp_to((radius - 0.5f + (float)(pixels - pixel)) * per_unit, 0.0f, (float)bins);
         const int a = min_int((int)from, bins - 1), b = min_int((int)to, bins - 1);
-        lower = lerp(scene->filter_cdf[a], scene->filter_cdf[a + 1], from - (float)a);
-        upper = lerp(scene->filter_cdf[b], scene->filter_cdf[b + 1], to - (float)b);
+        lower = lerp(cdf[a], cdf[a + 1], from - (float)a);
+        upper = lerp(cdf[b], cdf[b + 1], to - (float)b);
+        if (CLVOL_HAS_SIGNED_FILTER) {
+            __global const float *sums = cdf + bins + 1;
+            net = lerp(sums[b], sums[b + 1], to - (float)b) - lerp(sums[a], sums[a + 1], from - (float)a);
+        }
     }
     const float u = min_of(lerp(lower, upper, uniform_below_one(k)), 0x1.fffffep-1f); /* below the last bin's end */
     int first = 0, last = bins - 1;
     while (first < last) {
         const int middle = (first + last) >> 1;
-        if (scene->filter_cdf[middle + 1] > u)
+        if (cdf[middle + 1] > u)
             last = middle;
         else
             first = middle + 1;
     }
-    const float in_bin = (u - scene->filter_cdf[first]) / (scene->filter_cdf[first + 1] - scene->filter_cdf[first]);
+    if (CLVOL_HAS_SIGNED_FILTER)
+        *weight *= with_sign((upper - lower) / net, cdf[bins + 2 + first] - cdf[bins + 1 + first]);
+    const float in_bin = (u - cdf[first]) / (cdf[first + 1] - cdf[first]);
     return 0.5f - radius + ((float)first + in_bin) / per_unit;
 #else
     return uniform_float(k);
 #endif
+}
+
+/* Starts the camera ray of film position (x, y); u and v place it on the lens, uniformly over its disk. */
+INLINE void set_camera_ray(const Scene *scene, uint slot, float x, float y, float u, float v)
+{
+    __global const Render *render = scene->render;
+    float3 origin = load_vector(render->camera_position) + x * load_vector(render->camera_dx) +
+                    y * load_vector(render->camera_dy);
+    float3 towards = load_vector(render->camera_base) + x * load_vector(render->camera_base_dx) +
+                     y * load_vector(render->camera_base_dy);
+    if (CLVOL_HAS_LENS) {
+        const float2 place = sqrt(u) * cos_sin_turn(v);
+        const float3 lens = place.x * load_vector(render->lens_x) + place.y * load_vector(render->lens_y);
+        origin += render->lens_start * lens;
+        towards -= render->lens_bend * lens;
+    }
+    set_path_origin(scene, slot, origin);
+    set_path_direction(scene, slot, normalize(towards));
 }
 
 INLINE void start_job(const Scene *scene, uint slot, uint job)
@@ -64,12 +95,13 @@ INLINE void start_job(const Scene *scene, uint slot, uint job)
     const uint4 k = decision_block(render_seed(scene), key, BLOCK_CAMERA, 0);
     const int width = render->film_size[0];
     const int px = (int)(pixel % (uint)width), py = (int)(pixel / (uint)width);
-    const float x = (float)px + filter_offset(scene, k.x, px, width);
-    const float y = (float)py + filter_offset(scene, k.y, py, render->film_size[1]);
-    set_path_origin(scene, slot, load_vector(render->camera_position) + x * load_vector(render->camera_dx) +
-                                     y * load_vector(render->camera_dy));
-    set_path_direction(scene, slot, normalize(load_vector(render->camera_base) + x * load_vector(render->camera_base_dx) +
-                                              y * load_vector(render->camera_base_dy)));
+    float weight = 1.0f;
+    const float x = (float)px + filter_offset(scene, k.x, px, width, &weight);
+    const float y = (float)py + filter_offset(scene, k.y, py, render->film_size[1], &weight);
+    set_camera_ray(scene, slot, x, y, uniform_float(k.z), uniform_float(k.w));
+#if CLVOL_HAS_SIGNED_FILTER
+    set_path_sample_weight(scene, slot, weight);
+#endif
 #if CLVOL_ONE_CHANNEL_PER_PATH
     set_path_channel(scene, slot, job % CLVOL_JOBS_PER_SAMPLE);
 #endif
@@ -83,12 +115,7 @@ INLINE void start_job(const Scene *scene, uint slot, uint job)
 #if CLVOL_MIS
     set_path_pdf(scene, slot, 0.0f);
 #endif
-#if CLVOL_HAS_MANY_MEDIA
-    set_path_interval(scene, slot, 0);
-#endif
-#if CLVOL_HAS_OVERLAP
-    set_path_hit_medium(scene, slot, -1);
-#endif
+    reset_path(scene, slot);
 }
 
 /* Takes the next job for `slot` if there is one.  The counter is looked at before it is touched, so that

@@ -84,6 +84,68 @@ INLINE uint path_channel_or_zero(const Scene *scene, uint slot)
 #endif
 }
 
+/* How far along its ray the path is: where it last passed a surface. */
+INLINE float path_after(const Scene *scene, uint slot)
+{
+#if CLVOL_HAS_PASSABLE
+    return path_after_t(scene, slot);
+#else
+    return 0.0f;
+#endif
+}
+
+INLINE uint path_stretch_or_zero(const Scene *scene, uint slot)
+{
+#if CLVOL_HAS_PASSABLE
+    return path_stretch(scene, slot);
+#else
+    return 0;
+#endif
+}
+
+/* Where the path's ray ends at a surface. */
+INLINE float path_reach(const Scene *scene, uint slot)
+{
+#if CLVOL_HAS_SURFACES
+    return path_hit_t(scene, slot);
+#else
+    return INFINITY;
+#endif
+}
+
+/* A camera ray meets nothing beyond the far plane, and enters nothing there. */
+INLINE float ray_limit(const Scene *scene, uint slot, Ray ray)
+{
+    if (path_bounce(scene, slot) > 0)
+        return INFINITY;
+    return scene->render->camera_far / dot(ray.d, load_vector(scene->render->camera_forward));
+}
+
+/* A new ray has passed nothing yet. */
+INLINE void reset_ray(const Scene *scene, uint slot)
+{
+#if CLVOL_HAS_PASSABLE
+    set_path_stretch(scene, slot, 0);
+    set_path_after_t(scene, slot, 0.0f);
+    set_path_after_primitive(scene, slot, 0xFFFFFFFFu); /* NO_PRIMITIVE */
+#endif
+}
+
+/* A new path is inside of nothing until `intersect` finds otherwise. */
+INLINE void reset_path(const Scene *scene, uint slot)
+{
+    reset_ray(scene, slot);
+#if CLVOL_BOUNDARY_WORDS > 0
+    Inside inside;
+    for (int w = 0; w < CLVOL_BOUNDARY_WORDS; ++w)
+        inside.word[w] = 0;
+    set_inside(scene, slot, inside);
+#endif
+#if CLVOL_HAS_TRANSMISSION
+    set_path_eta_squared(scene, slot, 1.0f);
+#endif
+}
+
 #if CLVOL_HAS_MEDIA
 INLINE void record_tally(const Scene *scene, uint slot, Tally tally)
 {

@@ -1,7 +1,7 @@
-/* Handles what happened to a path: it escaped to the environment, or collided in a medium.
+/* Handles what happened to a path: it escaped to the environment, collided in a medium, or met a surface.
 
    A collision is absorbed or scattered; a scattering draws one next-event ray and the next direction.
-   The directional densities of phase function and light sampling are weighted by the power heuristic
+   The directional densities of phase function, or BSDF, and light sampling are weighted by the power heuristic
    (METHODS §6). */
 #ifndef CLVOL_STAGES_SHADE_H
 #define CLVOL_STAGES_SHADE_H
@@ -31,6 +31,43 @@ INLINE void shade_escape(const Scene *scene, uint slot)
     set_radiance(scene, slot, get_radiance(scene, slot) + radiance);
 #endif
 }
+
+/* Whether the scattering numbered `bounce` is one too many; what it would have carried on is counted. */
+INLINE bool depth_is_reached(const Scene *scene, uint slot, uint bounce, Spectrum beta)
+{
+#if CLVOL_HAS_MAX_DEPTH
+    if (bounce >= scene->render->max_depth) {
+        set_path_cut(scene, slot, path_cut(scene, slot) + 1);
+        set_path_cut_energy(scene, slot, path_cut_energy(scene, slot) + spectrum_mean(beta));
+        return true;
+    }
+#endif
+    return false;
+}
+
+#if CLVOL_NEE
+/* Queues a shadow ray that brings `value` along if nothing is in its way. */
+INLINE void queue_shadow(const Scene *scene, uint group, uint slot, float3 from, const LightSample *light, Spectrum value)
+{
+    set_path_shadow_x(scene, slot, light->direction.x);
+    set_path_shadow_y(scene, slot, light->direction.y);
+    set_path_shadow_z(scene, slot, light->direction.z);
+#if CLVOL_HAS_POINT || CLVOL_HAS_SPOT || CLVOL_HAS_AREA
+    set_path_shadow_distance(scene, slot, light->distance);
+#endif
+#if CLVOL_HAS_SURFACES
+    set_path_shadow_origin_x(scene, slot, from.x);
+    set_path_shadow_origin_y(scene, slot, from.y);
+    set_path_shadow_origin_z(scene, slot, from.z);
+#endif
+    set_shadow(scene, slot, value);
+    queue_push(scene, group, QUEUE_SHADOW, slot);
+}
+#endif
+
+#if CLVOL_HAS_SURFACES
+#include "stages/surface_scatter.h"
+#endif
 
 #if CLVOL_HAS_SCATTERING
 /* Absorption at a collision (METHODS §2): by event, by weight, or by weight as long as the path's weight
@@ -81,14 +118,10 @@ INLINE void next_event(const Scene *scene, uint group, uint slot, SampleKey key,
     const Spectrum value = beta * to_spectrum(light.value, (int)path_channel_or_zero(scene, slot)) * (pdf * weight);
     if (!(spectrum_max(value) > 0.0f))
         return;
-    set_path_shadow_x(scene, slot, light.direction.x);
-    set_path_shadow_y(scene, slot, light.direction.y);
-    set_path_shadow_z(scene, slot, light.direction.z);
-#if CLVOL_HAS_POINT
-    set_path_shadow_distance(scene, slot, light.distance);
+#if CLVOL_BOUNDARY_WORDS > 0
+    set_shadow_inside(scene, slot, get_inside(scene, slot));
 #endif
-    set_shadow(scene, slot, value);
-    queue_push(scene, group, QUEUE_SHADOW, slot);
+    queue_shadow(scene, group, slot, p, &light, value);
 #endif
 }
 
@@ -97,19 +130,18 @@ INLINE bool scatter(const Scene *scene, uint group, uint slot, SampleKey key, __
                            Spectrum beta)
 {
     key.bounce += 1;
-#if CLVOL_HAS_MAX_DEPTH
-    if (key.bounce >= scene->render->max_depth) {
-        set_path_cut(scene, slot, path_cut(scene, slot) + 1);
-        set_path_cut_energy(scene, slot, path_cut_energy(scene, slot) + spectrum_mean(beta));
+    if (depth_is_reached(scene, slot, key.bounce, beta))
         return false;
-    }
-#endif
     set_path_bounce(scene, slot, key.bounce); /* also numbers the shadow ray's random numbers */
     const Ray ray = path_ray(scene, slot);
     next_event(scene, group, slot, key, medium, ray.o, ray.d, beta);
     const uint4 k = decision_block(render_seed(scene), key, BLOCK_DIRECTION, 0);
     if (key.bounce > scene->render->rr_depth) {
-        const float survival = min_of(1.0f, spectrum_max(beta));
+        float survival = spectrum_max(beta);
+#if CLVOL_HAS_TRANSMISSION
+        survival *= path_eta_squared(scene, slot);
+#endif
+        survival = min_of(1.0f, survival);
         if (survival < 1.0f && !(uniform_float(k.z) < survival)) /* uniform_float may round to 1 */
             return false;
         beta /= survival;
@@ -123,12 +155,7 @@ INLINE bool scatter(const Scene *scene, uint group, uint slot, SampleKey key, __
     set_path_direction(scene, slot, wi);
     set_beta(scene, slot, beta);
     record_weight(scene, slot, spectrum_max(beta));
-#if CLVOL_HAS_MANY_MEDIA
-    set_path_interval(scene, slot, 0);
-#endif
-#if CLVOL_HAS_OVERLAP
-    set_path_hit_medium(scene, slot, -1);
-#endif
+    reset_ray(scene, slot);
     return true;
 }
 #endif
@@ -138,12 +165,12 @@ INLINE bool scatter(const Scene *scene, uint group, uint slot, SampleKey key, __
 INLINE bool shade_collision(const Scene *scene, uint group, uint slot)
 {
 #if CLVOL_HAS_MANY_MEDIA
-    __global const Medium *medium = scene->media + path_medium(scene, slot);
-    const uint interval = path_interval(scene, slot);
+    const int number = path_medium(scene, slot);
 #else
-    __global const Medium *medium = scene->media;
-    const uint interval = 0;
+    const int number = 0;
 #endif
+    __global const Medium *medium = scene->media + number;
+    const uint interval = path_stretch_or_zero(scene, slot) * scene->render->media + (uint)number;
     const float3 p = path_ray(scene, slot).o;
     const int channel = (int)path_channel_or_zero(scene, slot);
     Spectrum beta = get_beta(scene, slot);
@@ -171,6 +198,10 @@ INLINE void shade(const Scene *scene, uint group, uint slot)
 #if CLVOL_HAS_MEDIA
     else if (event == EVENT_COLLISION)
         goes_on = shade_collision(scene, group, slot);
+#endif
+#if CLVOL_HAS_SURFACES
+    else if (event == EVENT_SURFACE)
+        goes_on = shade_surface(scene, group, slot);
 #endif
     queue_push(scene, group, goes_on ? QUEUE_INTERSECT : QUEUE_GENERATE, slot);
 }

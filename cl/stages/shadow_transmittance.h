@@ -1,8 +1,9 @@
-/* Attenuates one next-event ray by every medium on its way and adds what arrives. */
+/* Attenuates one next-event ray by everything on its way and adds what arrives. */
 #ifndef CLVOL_STAGES_SHADOW_TRANSMITTANCE_H
 #define CLVOL_STAGES_SHADOW_TRANSMITTANCE_H
-#include "stages/medium_ray.h"
+#include "tracking/tally.h"
 
+#if CLVOL_HAS_MEDIA
 INLINE Extinction medium_transmittance(const MediumRay *in, uint4 k, Tally *tally)
 {
 #if CLVOL_HAS_HOMOGENEOUS
@@ -15,36 +16,117 @@ INLINE Extinction medium_transmittance(const MediumRay *in, uint4 k, Tally *tall
 #endif
 }
 
+/* Multiplies the transmittance of all media between `from` and `to`; false once nothing is left. */
+INLINE bool media_transmittance(const Scene *scene, SampleKey key, Ray ray, const Inside *inside, uint stretch, float from,
+                                float to, int channel, Tally *tally, Extinction *transmittance)
+{
+    for (uint m = 0; m < (CLVOL_HAS_MANY_MEDIA ? scene->render->media : 1u); ++m) {
+        float t0, t1;
+        if (!medium_part(scene, m, ray, inside, from, to, &t0, &t1))
+            continue;
+        const uint4 k = decision_block(render_seed(scene), key, BLOCK_SHADOW, walk_number(scene, stretch, (int)m));
+        Ray start = ray;
+        start.o += t0 * ray.d;
+        const MediumRay in = part_ray(scene, inside, (int)m, start, t1 - t0, channel);
+        *transmittance *= medium_transmittance(&in, k, tally);
+        if (extinction_max(*transmittance) == 0.0f)
+            return false;
+    }
+    return true;
+}
+#endif
+
+INLINE Ray shadow_ray(const Scene *scene, uint slot)
+{
+    Ray ray;
+#if CLVOL_HAS_SURFACES
+    ray.o = (float3)(path_shadow_origin_x(scene, slot), path_shadow_origin_y(scene, slot), path_shadow_origin_z(scene, slot));
+#else
+    ray.o = path_ray(scene, slot).o;
+#endif
+    ray.d = (float3)(path_shadow_x(scene, slot), path_shadow_y(scene, slot), path_shadow_z(scene, slot));
+    return ray;
+}
+
+INLINE float shadow_reach(const Scene *scene, uint slot)
+{
+#if CLVOL_HAS_POINT || CLVOL_HAS_SPOT || CLVOL_HAS_AREA
+    return path_shadow_distance(scene, slot);
+#else
+    return INFINITY;
+#endif
+}
+
+#if CLVOL_HAS_SURFACES
+/* Up to where a surface blocks the light: short of the lamp that it comes from, by what rounding may take. */
+INLINE float blocking_reach(Ray ray, float reach)
+{
+    return reach - (largest3(ray.o) + reach) * 0x1p-18f;
+}
+#endif
+
+/* What share of the light arrives: walks from surface to surface, up to the first that is opaque. */
+INLINE Spectrum shadow_share(const Scene *scene, uint slot, Tally *tally)
+{
+    const Ray ray = shadow_ray(scene, slot);
+    const float reach = shadow_reach(scene, slot);
+    const int channel = (int)path_channel_or_zero(scene, slot);
+    Spectrum share = (Spectrum)(1.0f);
+    Extinction transmittance = (Extinction)(1.0f);
+#if CLVOL_HAS_MEDIA
+    const SampleKey key = path_key(scene, slot);
+    Inside inside = get_shadow_inside(scene, slot);
+#else
+    Inside inside;
+#endif
+#if CLVOL_HAS_PASSABLE
+    const float blocked = reach < INFINITY ? blocking_reach(ray, reach) : INFINITY;
+    Hit hit = {0.0f, 0.0f, 0.0f, NO_PRIMITIVE};
+    for (uint stretch = 0; stretch < MOST_PASSED; ++stretch) {
+        const float from = hit.t;
+        hit = closest_hit(scene, ray, hit.t, hit.primitive, blocked);
+        const bool last = hit.primitive == NO_PRIMITIVE;
+        Surface surface;
+        if (!last) {
+            surface = hit_surface(scene, ray, &hit);
+            const float3 wi = to_local(&surface, -ray.d);
+            Side side;
+            if (!side_of(scene, scene->shapes + surface.shape, wi, &side))
+                return (Spectrum)(0.0f);
+            share *= null_transmission(scene, side.material, surface.uv, wi.z, channel);
+            if (!(spectrum_max(share) > 0.0f))
+                return share;
+        }
+#if CLVOL_HAS_MEDIA
+        if (!media_transmittance(scene, key, ray, &inside, stretch, from, last ? reach : hit.t, channel, tally,
+                                 &transmittance))
+            return (Spectrum)(0.0f);
+#endif
+        if (last)
+            return share * transmittance;
+        cross_boundary(scene->shapes + surface.shape, surface.ng, ray.d, &inside);
+    }
+    return (Spectrum)(0.0f);
+#else
+#if CLVOL_HAS_SURFACES
+    if (any_hit(scene, ray, reach < INFINITY ? blocking_reach(ray, reach) : INFINITY))
+        return (Spectrum)(0.0f);
+#endif
+#if CLVOL_HAS_MEDIA
+    media_transmittance(scene, key, ray, &inside, 0, 0.0f, reach, channel, tally, &transmittance);
+#endif
+    return share * transmittance;
+#endif
+}
+
 INLINE void shadow_transmittance(const Scene *scene, uint group, uint slot)
 {
-    SampleKey key = path_key(scene, slot);
-    Ray ray;
-    ray.o = (float3)(path_origin_x(scene, slot), path_origin_y(scene, slot), path_origin_z(scene, slot));
-    ray.d = (float3)(path_shadow_x(scene, slot), path_shadow_y(scene, slot), path_shadow_z(scene, slot));
-#if CLVOL_HAS_POINT
-    const float limit = path_shadow_distance(scene, slot);
-#else
-    const float limit = INFINITY;
-#endif
-    const int channel = (int)path_channel_or_zero(scene, slot);
-    Extinction transmittance = (Extinction)(1.0f);
     Tally tally = {0, 0, 0, 0, 0, 0, 0.0f};
-    for (uint m = 0; m < (CLVOL_HAS_MANY_MEDIA ? scene->render->media : 1u); ++m) {
-        __global const Medium *medium = scene->media + m;
-        float t0 = 0.0f, t1 = limit;
-        medium_interval(medium, ray, &t0, &t1);
-        if (!(t0 < t1))
-            continue;
-        const uint4 k = decision_block(render_seed(scene), key, BLOCK_SHADOW, m);
-        Ray inside = ray;
-        inside.o += t0 * ray.d;
-        const MediumRay in = medium_ray(scene, medium, inside, t1 - t0, channel);
-        transmittance *= medium_transmittance(&in, k, &tally);
-        if (extinction_max(transmittance) == 0.0f)
-            break;
-    }
+    const Spectrum share = shadow_share(scene, slot, &tally);
+#if CLVOL_HAS_MEDIA
     record_tally(scene, slot, tally);
-    set_radiance(scene, slot, get_radiance(scene, slot) + get_shadow(scene, slot) * transmittance);
+#endif
+    set_radiance(scene, slot, get_radiance(scene, slot) + get_shadow(scene, slot) * share);
 }
 
 #endif

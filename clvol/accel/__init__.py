@@ -1,4 +1,4 @@
 """Acceleration structures, built as pure NumPy functions from arrays to arrays.
 
-Majorant grids and kd-trees live here (bounding volume hierarchies will); nothing here touches OpenCL.
+Majorant grids, kd-trees and the surfaces' bounding volume hierarchy live here; nothing here touches OpenCL.
 """

@@ -1,17 +1,33 @@
-"""Emitters: environments, parallel light and point lights."""
+"""Emitters: environments, parallel light, point lights, spots and shapes that emit."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from clvol.scene.files import find_parameter
 from clvol.scene.image import image_from_array, read_image
 from clvol.scene.reader import Reader
-from clvol.scene.records import ConstantEmitter, DirectionalEmitter, EnvmapEmitter, PointEmitter
+from clvol.scene.records import (
+    ConstantEmitter,
+    DirectionalEmitter,
+    EnvmapEmitter,
+    PointEmitter,
+    Spectrum,
+    SpotEmitter,
+)
 from clvol.scene.transforms import keeps_angles
 
 NEGLIGIBLE = 1e-5
 """Share of the brightest value down to which negative values are rounding (colours out of the gamut)."""
+
+
+@dataclass(frozen=True)
+class AreaLight:
+    """What an `area` emitter adds to the shape it is in."""
+
+    radiance: Spectrum
 
 
 def constant(reader: Reader) -> ConstantEmitter:
@@ -73,6 +89,35 @@ def point(reader: Reader) -> PointEmitter:
         reader.fail("give either position or to_world, not both", "to_world")
     position = reader.vector("position", reader.transform()[:3, 3])
     return PointEmitter(intensity, tuple(position.tolist()))
+
+
+def spot(reader: Reader) -> SpotEmitter:
+    """The `spot` plugin: a cone of light along local +z, which fades from `beam_width` to `cutoff_angle`."""
+    _accept_common(reader)
+    reader.refuse("texture", "the spot is the same all round")
+    intensity = reader.color("intensity", 1.0, light=True)
+    cutoff = reader.number("cutoff_angle", 20.0, minimum=0.0, maximum=180.0)
+    if cutoff == 0:
+        reader.fail("a cutoff_angle of 0 leaves no light", "cutoff_angle")
+    beam = reader.number("beam_width", 0.75 * cutoff, minimum=0.0)
+    if beam > cutoff:
+        reader.fail(f"beam_width ({beam:g}) must not exceed cutoff_angle ({cutoff:g})", "beam_width")
+    to_world = reader.transform()
+    if not keeps_angles(to_world):
+        reader.fail("to_world of a spot must not stretch or shear it", "to_world", "change cutoff_angle")
+    return SpotEmitter(intensity, to_world, cutoff, beam)
+
+
+def area(reader: Reader) -> AreaLight:
+    """The `area` plugin, which makes the shape round it a light of the same radiance all over."""
+    _accept_common(reader)
+    if reader.has("radiance") and not reader.is_value("radiance"):
+        reader.fail(
+            "the radiance of an area emitter cannot vary over the shape",
+            "radiance",
+            "give a number, an rgb or a spectrum",
+        )
+    return AreaLight(reader.color("radiance", 1.0, light=True))
 
 
 def _accept_common(reader: Reader) -> None:

@@ -11,17 +11,20 @@ from clvol.scene.spectra import srgb_to_linear
 MAX_PIXELS = 2**28
 
 
-def read_image(path: str, where: str) -> np.ndarray:
+def read_image(path: str, where: str, raw: bool = False) -> np.ndarray:
     """The image in file `path` as linear RGB, float32 (height, width, 3), top row first.
 
-    8-bit files, and PNG of any depth, are sRGB-decoded; grey images are replicated, alpha is dropped.
+    8-bit files, and PNG of any depth, are sRGB-decoded unless `raw`; grey images are replicated, alpha is
+    dropped, and colours are as stored, not multiplied by it.
 
     Raises
     ------
     SceneError
         At `where`: not an image, damaged, or larger than `MAX_PIXELS`.
     """
-    opened = oiio.ImageInput.open(path)
+    config = oiio.ImageSpec()
+    config.attribute("oiio:UnassociatedAlpha", 1)
+    opened = oiio.ImageInput.open(path, config)
     if opened is None:
         raise SceneError(f"cannot read image '{path}'", where, _reason(oiio.geterror()))
     try:
@@ -35,13 +38,13 @@ def read_image(path: str, where: str) -> np.ndarray:
         encoded = str(spec.format) == "uint8" or (integers and opened.format_name() == "png")
     finally:
         opened.close()
-    return _linear_rgb(np.asarray(pixels), encoded)
+    return _linear_rgb(np.asarray(pixels), encoded and not raw)
 
 
-def image_from_array(array: np.ndarray, where: str) -> np.ndarray:
+def image_from_array(array: np.ndarray, where: str, raw: bool = False) -> np.ndarray:
     """`array` (height, width) or (height, width, 1..4 channels) as linear RGB, float32 (height, width, 3).
 
-    uint8 values are sRGB-encoded, uint16 values linear, both from 0 to their type's maximum.
+    uint8 values are sRGB-encoded unless `raw`, uint16 values linear, both from 0 to their type's maximum.
 
     Raises
     ------
@@ -55,7 +58,7 @@ def image_from_array(array: np.ndarray, where: str) -> np.ndarray:
         if pixels.dtype not in (np.uint8, np.uint16):
             raise SceneError(f"expected floats, uint8 or uint16, got {array.dtype}", where)
         pixels = pixels / np.float32(np.iinfo(pixels.dtype).max)
-    return _linear_rgb(pixels, array.dtype == np.uint8)
+    return _linear_rgb(pixels, array.dtype == np.uint8 and not raw)
 
 
 def _linear_rgb(pixels: np.ndarray, encoded: bool) -> np.ndarray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from clvol.scene.reader import Reader
 from clvol.scene.records import Integrator
 
@@ -9,12 +11,39 @@ CHOICES = ("technique", "transmittance", "majorant", "lookup", "absorption", "pr
 """Parameters handed on as strings; what they may say is for the registry of techniques to judge."""
 
 
-def volpath(reader: Reader) -> Integrator:
+@dataclass(frozen=True)
+class Chosen:
+    """An integrator, and whether it looks into media; `name` is the plugin's."""
+
+    integrator: Integrator
+    media: bool = True
+    name: str = "volpath"
+
+
+def volpath(reader: Reader) -> Chosen:
     """The `volpath` and `volpathmis` plugins, which have the same parameters and the same expectation."""
+    choices = {name: reader.string(name, "") for name in CHOICES if reader.has(name)}
+    return Chosen(_limits(reader, choices), True, reader.type)
+
+
+def path(reader: Reader) -> Chosen:
+    """The `path` plugin, for scenes without media."""
+    return Chosen(_limits(reader, {}), False, reader.type)
+
+
+def moment(reader: Reader) -> Chosen:
+    """The `moment` plugin: every render measures its variance, so it is the integrator inside."""
+    inner = reader.only_child("integrator")
+    if inner is None:
+        reader.fail("a moment integrator holds another one, this one is empty", hint="volpath, for instance")
+    return reader.build.build(inner)
+
+
+def _limits(reader: Reader, choices: dict[str, str]) -> Integrator:
     reader.ignore("samples_per_pass", "block_size")
     return Integrator(
         max_depth=reader.integer("max_depth", -1, -1),
         rr_depth=reader.integer("rr_depth", 5, 1),
         hide_emitters=reader.boolean("hide_emitters", False),
-        choices={name: reader.string(name, "") for name in CHOICES if reader.has(name)},
+        choices=choices,
     )

@@ -6,20 +6,52 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from clvol.errors import SceneError
-from clvol.scene import emitter, integrator, medium, phase, sensor, shape, volume
+from clvol.scene import bsdf, emitter, integrator, medium, phase, sensor, shape, texture, volume
 from clvol.scene.builder import Builder, PluginTable
+from clvol.scene.mesh_files import FORMATS
 from clvol.scene.nodes import Node, from_dict
-from clvol.scene.records import ConstantEmitter, EnvmapEmitter, Integrator, Scene
+from clvol.scene.records import ConstantEmitter, EnvmapEmitter, Integrator, Scene, Shape
 from clvol.scene.xml import read_xml
 
 PLUGINS: PluginTable = {
-    "integrator": {"volpath": integrator.volpath, "volpathmis": integrator.volpath},
-    "sensor": {"perspective": sensor.perspective},
+    "integrator": {
+        "volpath": integrator.volpath,
+        "volpathmis": integrator.volpath,
+        "path": integrator.path,
+        "moment": integrator.moment,
+    },
+    "sensor": {"perspective": sensor.perspective, "thinlens": sensor.thinlens},
     "film": {"hdrfilm": sensor.hdrfilm},
-    "rfilter": {"box": sensor.box, "tent": sensor.tent, "gaussian": sensor.gaussian},
+    "rfilter": {
+        "box": sensor.box,
+        "tent": sensor.tent,
+        "gaussian": sensor.gaussian,
+        "mitchell": sensor.mitchell,
+        "catmullrom": sensor.catmullrom,
+        "lanczos": sensor.lanczos,
+    },
     "sampler": {"independent": sensor.independent},
-    "shape": {"cube": shape.cube, "sphere": shape.sphere},
-    "bsdf": {"null": shape.null},
+    "shape": {
+        "cube": shape.cube,
+        "sphere": shape.sphere,
+        "rectangle": shape.rectangle,
+        "disk": shape.disk,
+        "cylinder": shape.cylinder,
+        **dict.fromkeys(FORMATS, shape.mesh),
+    },
+    "bsdf": {
+        "null": bsdf.null,
+        "diffuse": bsdf.diffuse,
+        "dielectric": bsdf.dielectric,
+        "thindielectric": bsdf.thindielectric,
+        "roughdielectric": bsdf.roughdielectric,
+        "conductor": bsdf.conductor,
+        "roughconductor": bsdf.roughconductor,
+        "plastic": bsdf.plastic,
+        "roughplastic": bsdf.roughplastic,
+        "twosided": bsdf.twosided,
+        "mask": bsdf.mask,
+    },
     "medium": {"homogeneous": medium.homogeneous, "heterogeneous": medium.heterogeneous},
     "volume": {
         "gridvolume": volume.gridvolume,
@@ -37,8 +69,10 @@ PLUGINS: PluginTable = {
         "envmap": emitter.envmap,
         "directional": emitter.directional,
         "point": emitter.point,
+        "spot": emitter.spot,
+        "area": emitter.area,
     },
-    "texture": {},
+    "texture": {"bitmap": texture.bitmap, "checkerboard": texture.checkerboard},
 }
 """Kind -> plugin name -> the function that builds its record."""
 
@@ -93,23 +127,11 @@ def _build(root: Node, source: str) -> Scene:
             seen.add(id(node))
             records[builder.kind_of(node)].append((node, builder.build(node)))
     camera = _exactly_one_sensor(records["sensor"], root)
-    environments = [
-        node for node, record in records["emitter"] if isinstance(record, ConstantEmitter | EnvmapEmitter)
-    ]
-    if len(environments) > 1:
-        raise SceneError(
-            "a scene takes one environment emitter, this is the second",
-            environments[1].where,
-            f"the first is at {environments[0].where}",
-        )
-    if len(records["integrator"]) > 1:
-        raise SceneError(
-            "a scene takes one integrator, this is the second", records["integrator"][1][0].where
-        )
+    _check_emitters(records["emitter"])
     return Scene(
         sensor=camera.camera,
         film=camera.film,
-        integrator=records["integrator"][0][1] if records["integrator"] else Integrator(),
+        integrator=_integrator(records["integrator"], [record for _, record in records["shape"]]),
         shapes=tuple(record for _, record in records["shape"]),
         emitters=tuple(record for _, record in records["emitter"]),
         spp=camera.sampler.spp,
@@ -124,3 +146,39 @@ def _exactly_one_sensor(sensors: list[tuple[Node, sensor.Sensor]], root: Node) -
     if len(sensors) > 1:
         raise SceneError("a scene takes one sensor, this is the second", sensors[1][0].where)
     return sensors[0][1]
+
+
+def _check_emitters(emitters: list[tuple[Node, object]]) -> None:
+    """At most one environment, and no area emitter outside a shape."""
+    environments = [node for node, record in emitters if isinstance(record, ConstantEmitter | EnvmapEmitter)]
+    if len(environments) > 1:
+        raise SceneError(
+            "a scene takes one environment emitter, this is the second",
+            environments[1].where,
+            f"the first is at {environments[0].where}",
+        )
+    for node, record in emitters:
+        if isinstance(record, emitter.AreaLight):
+            raise SceneError(
+                "an area emitter outside a shape lights nothing",
+                node.where,
+                "put it into the shape that emits",
+            )
+
+
+def _integrator(integrators: list[tuple[Node, integrator.Chosen]], shapes: list[Shape]) -> Integrator:
+    """The one integrator, which must see the scene's media if there are any."""
+    if not integrators:
+        return Integrator()
+    if len(integrators) > 1:
+        raise SceneError("a scene takes one integrator, this is the second", integrators[1][0].where)
+    node, chosen = integrators[0]
+    bounds = [shape for shape in shapes if shape.interior or shape.exterior]
+    if bounds and not chosen.media:
+        name = f" (shape '{bounds[0].name}')" if bounds[0].name else ""
+        raise SceneError(
+            f"integrator '{chosen.name}' sees no media, and the scene has some{name}",
+            node.where,
+            "use volpath",
+        )
+    return chosen.integrator

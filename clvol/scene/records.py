@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from clvol.scene.materials import Bsdf, Null
 from clvol.volumes.grid import Grid
 
 Spectrum = tuple[float, ...]
@@ -30,24 +31,37 @@ def as_spectrum(value: float | Iterable[float]) -> Spectrum:
 class ReconstructionFilter:
     """Pixel filter; `radius` and `stddev` in pixels (stddev only for the Gaussian)."""
 
-    kind: str = "gaussian"  # "box" | "tent" | "gaussian"
+    kind: str = "gaussian"  # "box" | "tent" | "gaussian" | "mitchell"
     radius: float = 2.0
     stddev: float = 0.5
+    b: float = 1 / 3  # of mitchell
+    c: float = 1 / 3
 
 
 @dataclass(frozen=True)
 class Film:
-    """Image size in pixels and the filter each pixel is integrated with."""
+    """Image size in pixels and the filter each pixel is integrated with.
+
+    `crop` (x, y, width, height): the part of it that is rendered; None: all.
+    """
 
     width: int = 768
     height: int = 576
     rfilter: ReconstructionFilter = ReconstructionFilter()
     sample_border: bool = False
+    crop: tuple[int, int, int, int] | None = None
+
+    @property
+    def window(self) -> tuple[int, int, int, int]:
+        """x, y, width and height of what is rendered."""
+        return self.crop or (0, 0, self.width, self.height)
 
 
 @dataclass(frozen=True, eq=False)
 class Perspective:
-    """Pinhole camera looking along local +z; local +x is the image's left (look_at convention).
+    """Camera looking along local +z; local +x is the image's left (look_at convention).
+
+    A pinhole, or with an `aperture_radius` a thin lens that is sharp at depth `focus_distance`.
 
     `fov` in degrees is along `fov_axis`: "x", "y", "diagonal", "smaller" or "larger".
     `principal_point_offset` is relative to the film size, as in Mitsuba.
@@ -59,6 +73,8 @@ class Perspective:
     near_clip: float = 1e-2
     far_clip: float = 1e4
     principal_point_offset: tuple[float, float] = (0.0, 0.0)
+    aperture_radius: float = 0.0
+    focus_distance: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,13 +168,44 @@ class Medium:
         return True
 
 
+NO_SURFACE = Null()
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles in the shape's local space.
+
+    vertices : float32 (n, 3).  faces : int32 (m, 3), counter-clockwise seen from outside.
+    normals : float32 (n, 3), unit, of smooth shading; None: the faces' own.  uvs : float32 (n, 2), or None.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    normals: np.ndarray | None = None
+    uvs: np.ndarray | None = None
+    source: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Closed surface that bounds a medium: "cube" (−1..1)³ or the unit "sphere", under `to_world`."""
+    """A surface: what it looks like, what it emits, and which media it divides.
+
+    kind : under `to_world` the "cube" (−1..1)³, the unit "sphere", the "rectangle" (−1..1)² with normal +z,
+        the unit "disk" with normal +z, the "cylinder" of radius 1 and z in 0..1 (open ends, normals outward), or
+        the "mesh" in `mesh`.
+    interior, exterior : media behind the surface and before it (the side its normals point to).
+    emission : radiance of the front side; None where the shape is no light.
+    flip_normals : front and back change places.
+    """
 
     kind: str
     to_world: np.ndarray
     interior: Medium | None = None
+    exterior: Medium | None = None
+    bsdf: Bsdf = NO_SURFACE
+    emission: Spectrum | None = None
+    flip_normals: bool = False
+    mesh: Mesh | None = None
     name: str = ""
 
 
@@ -194,7 +241,19 @@ class PointEmitter:
     position: tuple[float, float, float]
 
 
-Emitter = ConstantEmitter | EnvmapEmitter | DirectionalEmitter | PointEmitter
+@dataclass(frozen=True, eq=False)
+class SpotEmitter:
+    """Point light along local +z of `to_world`: `intensity` up to `beam_width` off the axis, falling in a
+    straight line with the angle to 0 at `cutoff_angle` (both in degrees)."""
+
+    intensity: Spectrum
+    to_world: np.ndarray
+    cutoff_angle: float = 20.0
+    beam_width: float = 15.0
+
+
+Emitter = ConstantEmitter | EnvmapEmitter | DirectionalEmitter | PointEmitter | SpotEmitter
+"""Lights that are no surface; area lights are shapes with an `emission`."""
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,22 +34,36 @@ class Sensor:
 
 def perspective(reader: Reader) -> Sensor:
     """The `perspective` plugin; a focal length is for 35 mm film, along the diagonal."""
+    camera = _pinhole(reader)
+    offset = tuple(reader.number(f"principal_point_offset_{axis}", 0.0) for axis in "xy")
+    return _sensor(reader, replace(camera, principal_point_offset=offset))
+
+
+def thinlens(reader: Reader) -> Sensor:
+    """The `thinlens` plugin: a perspective camera that is sharp at one depth, by default the far plane's.
+
+    An aperture of radius 0 is a pinhole.
+    """
+    camera = _pinhole(reader)
+    if not reader.has("aperture_radius"):
+        reader.fail("a thinlens needs an aperture_radius", hint="in world units; 0 is a pinhole")
+    aperture = reader.number("aperture_radius", 0.0, minimum=0.0)
+    focus = reader.number("focus_distance", camera.far_clip, minimum=0.0, open_interval=True)
+    return _sensor(reader, replace(camera, aperture_radius=aperture, focus_distance=focus))
+
+
+def _pinhole(reader: Reader) -> Perspective:
+    """What every perspective camera has: its place, field of view, near and far plane."""
     fov, fov_axis = _field_of_view(reader)
     near = reader.number("near_clip", 1e-2, minimum=0.0, open_interval=True)
     far = reader.number("far_clip", 1e4)
     if far <= near:
         reader.fail(f"far_clip ({far:g}) must be beyond near_clip ({near:g})", "far_clip")
-    camera = Perspective(
-        to_world=_rigid(reader),
-        fov=fov,
-        fov_axis=fov_axis,
-        near_clip=near,
-        far_clip=far,
-        principal_point_offset=(
-            reader.number("principal_point_offset_x", 0.0),
-            reader.number("principal_point_offset_y", 0.0),
-        ),
-    )
+    return Perspective(_rigid(reader), fov, fov_axis, near, far)
+
+
+def _sensor(reader: Reader, camera: Perspective) -> Sensor:
+    """`camera` with the film and sampler inside the sensor."""
     film_node, sampler_node = reader.only_child("film"), reader.only_child("sampler")
     # The medium round the camera is found from the shapes; naming it, as Mitsuba needs, is checked only.
     for _, medium in reader.children("medium"):
@@ -98,8 +112,6 @@ def hdrfilm(reader: Reader) -> Film:
         reader.fail(
             f"a film of {width} x {height} pixels is too large", "width", f"at most {MAX_PIXELS} pixels"
         )
-    for name in ("crop_offset_x", "crop_offset_y", "crop_width", "crop_height"):
-        reader.refuse(name)
     if reader.has("pixel_format") and reader.string("pixel_format", "rgb") != "rgb":
         reader.fail(
             f"pixel_format '{reader.string('pixel_format', 'rgb')}' is not supported in this version",
@@ -114,7 +126,25 @@ def hdrfilm(reader: Reader) -> Film:
         height,
         reader.build.build(rfilter) if rfilter else ReconstructionFilter(),
         reader.boolean("sample_border", False),
+        _crop(reader, width, height),
     )
+
+
+def _crop(reader: Reader, width: int, height: int) -> tuple[int, int, int, int] | None:
+    """The part of the film that is rendered; None for all of it."""
+    crop = []
+    for axis, side, size in (("x", "width", width), ("y", "height", height)):
+        offset = reader.integer(f"crop_offset_{axis}", 0, 0)
+        length = reader.integer(f"crop_{side}", size, 1)
+        if offset + length > size:
+            reader.fail(
+                f"the crop window reaches beyond the film: crop_offset_{axis} {offset} and "
+                f"crop_{side} {length} exceed its {side} {size}",
+                f"crop_{side}" if reader.has(f"crop_{side}") else f"crop_offset_{axis}",
+            )
+        crop += [offset, length]
+    x, columns, y, rows = crop
+    return None if (columns, rows) == (width, height) else (x, y, columns, rows)
 
 
 def box(reader: Reader) -> ReconstructionFilter:
@@ -132,6 +162,22 @@ def gaussian(reader: Reader) -> ReconstructionFilter:
     """The `gaussian` filter, cut off at four standard deviations."""
     stddev = reader.number("stddev", 0.5, minimum=0.0, maximum=4.0, open_interval=True)
     return ReconstructionFilter("gaussian", radius=4 * stddev, stddev=stddev)
+
+
+def mitchell(reader: Reader) -> ReconstructionFilter:
+    """The `mitchell` filter with its parameters `B` and `C`, from 0 to 1 (Mitchell and Netravali 1988)."""
+    b, c = (reader.number(name, 1 / 3, minimum=0.0, maximum=1.0) for name in "BC")
+    return ReconstructionFilter("mitchell", radius=2.0, stddev=0.0, b=b, c=c)
+
+
+def catmullrom(reader: Reader) -> ReconstructionFilter:
+    """The `catmullrom` filter, which is Mitchell and Netravali's with B = 0 and C = ½."""
+    return ReconstructionFilter("mitchell", radius=2.0, stddev=0.0, b=0.0, c=0.5)
+
+
+def lanczos(reader: Reader) -> ReconstructionFilter:
+    """The `lanczos` filter: a sinc under the main lobe of a wider one, as far as that has `lobes`."""
+    return ReconstructionFilter("lanczos", radius=float(reader.integer("lobes", 3, 1, 16)), stddev=0.0)
 
 
 def independent(reader: Reader) -> Sampler:

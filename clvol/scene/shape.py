@@ -1,23 +1,37 @@
-"""Shapes: closed surfaces that bound a medium."""
+"""Shapes: what they are made of, what they emit, and which media they divide."""
 
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 
+from clvol.scene.emitter import AreaLight
+from clvol.scene.files import find_parameter
+from clvol.scene.materials import Diffuse
+from clvol.scene.mesh_files import read_mesh
 from clvol.scene.reader import Reader
-from clvol.scene.records import Medium, Shape
+from clvol.scene.records import Medium, Mesh, Shape
 from clvol.scene.transforms import keeps_angles, scale, translate
 
-
-def null(reader: Reader) -> str:
-    """The `null` BSDF: light passes the surface unchanged."""
-    return "null"
+log = logging.getLogger("clvol")
 
 
 def cube(reader: Reader) -> Shape:
     """The `cube` plugin, -1..1 along each axis under `to_world`."""
     reader.ignore("face_normals")
     return _shape(reader, "cube", reader.transform())
+
+
+def rectangle(reader: Reader) -> Shape:
+    """The `rectangle` plugin, -1..1 along x and y under `to_world`, facing +z."""
+    reader.ignore("face_normals")
+    return _shape(reader, "rectangle", reader.transform())
+
+
+def disk(reader: Reader) -> Shape:
+    """The `disk` plugin, of radius 1 and facing +z; `to_world` may make it an ellipse."""
+    return _shape(reader, "disk", reader.transform())
 
 
 def sphere(reader: Reader) -> Shape:
@@ -34,34 +48,100 @@ def sphere(reader: Reader) -> Shape:
     return _shape(reader, "sphere", matrix @ translate(center) @ scale(radius))
 
 
-def _shape(reader: Reader, kind: str, to_world: np.ndarray) -> Shape:
-    """A shape with its interior medium, once it is known to have a null BSDF and nothing unsupported."""
-    if reader.boolean("flip_normals", False):
-        reader.fail("flip_normals is not supported in this version", "flip_normals")
-    interior = _interior(reader)
-    for name, emitter in reader.children("emitter"):
-        reader.build.check_supported(emitter)
-        reader.fail(f"a shape takes no emitter '{emitter.type}'", name)
-    bsdf = reader.only_child("bsdf")
-    if bsdf is None:
+def cylinder(reader: Reader) -> Shape:
+    """The `cylinder` plugin, open at its ends `p0` and `p1`; they and `radius` apply before `to_world`.
+
+    One that emits must stay round: its points are drawn evenly by angle.
+    """
+    first, last = reader.vector("p0", (0.0, 0.0, 0.0)), reader.vector("p1", (0.0, 0.0, 1.0))
+    radius = reader.number("radius", 1.0, minimum=0.0, open_interval=True)
+    length = float(np.linalg.norm(last - first))
+    if length == 0:
+        reader.fail("p0 and p1 are the same point", "p1" if reader.has("p1") else "p0")
+    matrix = reader.transform() @ translate(first) @ _frame((last - first) / length)
+    shape = _shape(reader, "cylinder", matrix @ scale([radius, radius, length]))
+    gram = matrix[:3, :3].T @ matrix[:3, :3]
+    if shape.emission and not np.allclose(gram, np.diag(np.diag(gram)[[0, 0, 2]]), atol=1e-4 * gram.max()):
         reader.fail(
-            f"shape '{reader.type}' without a BSDF is diffuse, which is not supported in this version",
-            hint='add <bsdf type="null"/> to make it the boundary of a medium',
+            "to_world of a cylinder that emits must not stretch it across or shear it",
+            "to_world",
+            "scale x and y alike in the cylinder's own frame",
         )
-    reader.build.build(bsdf)
-    return Shape(kind, to_world, interior, name=reader.node.id)
+    return shape
 
 
-def _interior(reader: Reader) -> Medium | None:
-    interior = None
+def mesh(reader: Reader) -> Shape:
+    """The `obj`, `ply`, `stl`, `glb` and `gltf` plugins: the triangles of a file.
+
+    An stl has neither normals nor texture coordinates of its vertices.
+    """
+    if not reader.has("filename"):
+        reader.fail(f"shape '{reader.type}' needs a filename")
+    path = find_parameter(reader, "filename")
+    flip = reader.type != "stl" and reader.boolean("flip_tex_coords", reader.type != "ply")
+    face_normals = reader.boolean("face_normals", False)
+    try:
+        read, origin = read_mesh(path, reader.type, flip, face_normals)
+    except ValueError as error:
+        name = f" of shape '{reader.node.id}'" if reader.node.id else ""
+        reader.fail(f"mesh '{path}'{name}: {error}", "filename")
+    return _shape(reader, "mesh", reader.transform() @ translate(origin), read)
+
+
+def _frame(z: np.ndarray) -> np.ndarray:
+    """Rotation that turns local +z onto the unit vector `z` (Duff et al. 2017), so that u = 0 lies where
+    Mitsuba's cylinders have it."""
+    sign = np.copysign(1.0, z[2])
+    a = -1 / (sign + z[2])
+    b = z[0] * z[1] * a
+    matrix = np.eye(4)
+    matrix[:3, 0] = 1 + sign * z[0] ** 2 * a, sign * b, -sign * z[0]
+    matrix[:3, 1] = b, sign + z[1] ** 2 * a, -z[1]
+    matrix[:3, 2] = z
+    return matrix
+
+
+def _shape(reader: Reader, kind: str, to_world: np.ndarray, triangles: Mesh | None = None) -> Shape:
+    """A shape with what is inside it.  Without a BSDF it is diffuse, or black if it emits, as in Mitsuba."""
+    media = _media(reader)
+    emission = _emission(reader)
+    bsdf = reader.only_child("bsdf")
+    if bsdf is None and media:
+        log.warning(
+            "%s: the shape has a medium but no BSDF, so it is diffuse and hides the medium; "
+            'add <bsdf type="null"/> to look into it',
+            reader.node.where,
+        )
+    return Shape(
+        kind,
+        to_world,
+        interior=media.get("interior"),
+        exterior=media.get("exterior"),
+        bsdf=reader.build.build(bsdf) if bsdf else Diffuse((0.0,) if emission else (0.5,)),
+        emission=emission,
+        flip_normals=reader.boolean("flip_normals", False),
+        mesh=triangles,
+        name=reader.node.id,
+    )
+
+
+def _emission(reader: Reader) -> tuple[float, ...] | None:
+    """Radiance of the `area` emitter inside, if there is one."""
+    node = reader.only_child("emitter")
+    if node is None:
+        return None
+    light = reader.build.build(node)
+    if not isinstance(light, AreaLight):
+        name = next(name for name, _ in reader.children("emitter"))
+        reader.fail(f"a shape takes no emitter '{node.type}'", name, "area emitters go into shapes")
+    return light.radiance
+
+
+def _media(reader: Reader) -> dict[str, Medium]:
+    """The media behind and before the surface, by the names "interior" and "exterior"."""
+    media = {}
     for name, medium in reader.children("medium"):
-        if name == "exterior":
-            reader.fail(
-                "an exterior medium is not supported in this version",
-                name,
-                "media that overlap add; the medium round the camera is found from the shapes",
-            )
-        if name != "interior":
-            reader.fail(f"the medium '{name}' of a shape must be its 'interior'", name)
-        interior = reader.build.build(medium)
-    return interior
+        if name not in ("interior", "exterior"):
+            reader.fail(f"the medium '{name}' of a shape must be its 'interior' or 'exterior'", name)
+        media[name] = reader.build.build(medium)
+    return media

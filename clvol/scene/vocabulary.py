@@ -9,22 +9,18 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 
 LATER: dict[str, tuple[str, ...]] = {
-    "integrator": ("path", "moment", "direct", "aov", "depth", "ptracer"),
-    "sensor": ("thinlens", "orthographic", "radiancemeter", "irradiancemeter", "distant", "batch"),
+    "integrator": ("direct", "aov", "depth", "ptracer"),
+    "sensor": ("orthographic", "radiancemeter", "irradiancemeter", "distant", "batch"),
     "film": ("specfilm",),
-    "rfilter": ("mitchell", "catmullrom", "lanczos"),
     "sampler": ("stratified", "multijitter", "orthogonal", "ldsampler"),
     "shape": (
-        *("rectangle", "disk", "cylinder", "obj", "ply", "serialized", "mesh", "instance", "shapegroup"),
-        *("bsplinecurve", "linearcurve", "sdfgrid", "ellipsoids", "heightfield", "merge"),
+        *("serialized", "mesh", "instance", "shapegroup", "bsplinecurve", "linearcurve", "sdfgrid"),
+        *("ellipsoids", "heightfield", "merge"),
     ),
-    "bsdf": (
-        *("diffuse", "dielectric", "roughdielectric", "thindielectric", "conductor", "roughconductor"),
-        *("plastic", "roughplastic", "twosided", "mask", "principled", "bumpmap", "normalmap", "blendbsdf"),
-    ),
+    "bsdf": ("principled", "bumpmap", "normalmap", "blendbsdf"),
     "phase": ("sggx", "tabphase"),
-    "emitter": ("area", "spot", "projector", "directionalarea", "sunsky"),
-    "texture": ("bitmap", "checkerboard", "mesh_attribute", "volume", "uniform", "srgb", "d65", "blackbody"),
+    "emitter": ("projector", "directionalarea", "sunsky"),
+    "texture": ("mesh_attribute", "volume", "uniform", "srgb", "d65", "blackbody"),
 }
 """Kind -> plugins known by name and not supported in this version."""
 

@@ -1,0 +1,128 @@
+/* The BSDF of a material: dispatches to the kinds that the scene has.
+
+   The headers of those kinds are included before this one (BSDF_HEADERS in clvol/material_table.py), with
+   CLVOL_BSDF_<kind> 1; of the others there is nothing.  A mask is the `opacity` of a material, which the caller decides
+   first; all here is what is left of the surface then.  One-sided kinds reflect on the side of +z alone: the caller
+   picks the side's material and turns z (material_transmits). */
+#ifndef CLVOL_BSDF_H
+#define CLVOL_BSDF_H
+#include "bsdf/sample.h"
+
+/* Without a look where the scene has one kind only. */
+#define BSDF_KINDS                                                                                            \
+    (CLVOL_BSDF_NULL + CLVOL_BSDF_DIFFUSE + CLVOL_BSDF_DIELECTRIC + CLVOL_BSDF_THIN_DIELECTRIC +              \
+     CLVOL_BSDF_ROUGH_DIELECTRIC + CLVOL_BSDF_CONDUCTOR + CLVOL_BSDF_ROUGH_CONDUCTOR + CLVOL_BSDF_PLASTIC +   \
+     CLVOL_BSDF_ROUGH_PLASTIC)
+#define IS_BSDF(material, name) \
+    (CLVOL_BSDF_##name && (BSDF_KINDS == 1 || (material)->kind == MATERIAL_##name))
+
+/* Share of the surface that is there at all. */
+INLINE float material_opacity(const Scene *scene, __global const Material *material, float2 uv)
+{
+#if CLVOL_HAS_TEXTURES
+    if (material->opacity_texture >= 0)
+        return material->opacity * texture_value(scene, material->opacity_texture, uv).x;
+#endif
+    return material->opacity;
+}
+
+/* Only delta lobes: no light can be sampled for it. */
+INLINE bool material_is_smooth(__global const Material *material)
+{
+    return IS_BSDF(material, NULL) || IS_BSDF(material, DIELECTRIC) || IS_BSDF(material, THIN_DIELECTRIC) ||
+           IS_BSDF(material, CONDUCTOR);
+}
+
+/* Takes wi and wo on either side as they are; others are seen from +z alone. */
+INLINE bool material_transmits(__global const Material *material)
+{
+    return IS_BSDF(material, NULL) || IS_BSDF(material, DIELECTRIC) || IS_BSDF(material, THIN_DIELECTRIC) ||
+           IS_BSDF(material, ROUGH_DIELECTRIC);
+}
+
+/* What a ray that goes straight on keeps: the mask's holes, and what is left passes straight on itself. */
+INLINE Spectrum null_transmission(const Scene *scene, __global const Material *material, float2 uv, float cos_i,
+                                  int channel)
+{
+    if (IS_BSDF(material, NULL))
+        return (Spectrum)(1.0f);
+    const float opacity = material_opacity(scene, material, uv);
+#if CLVOL_BSDF_THIN_DIELECTRIC
+    if (IS_BSDF(material, THIN_DIELECTRIC))
+        return (Spectrum)(1.0f - opacity) +
+               opacity * thin_dielectric_transmission(scene, material, uv, cos_i, channel);
+#endif
+    return (Spectrum)(1.0f - opacity);
+}
+
+/* f |cos theta_o| and the pdf, in solid angle, with which bsdf_sample draws wo; 0 and 0 for delta lobes. */
+INLINE Spectrum bsdf_value(const Scene *scene, __global const Material *material, float2 uv, float3 wi, float3 wo,
+                           int channel, float *pdf)
+{
+#if CLVOL_BSDF_DIFFUSE
+    if (IS_BSDF(material, DIFFUSE))
+        return diffuse_value(scene, material, uv, wi, wo, channel, pdf);
+#endif
+#if CLVOL_BSDF_ROUGH_DIELECTRIC
+    if (IS_BSDF(material, ROUGH_DIELECTRIC))
+        return rough_dielectric_value(scene, material, uv, wi, wo, channel, pdf);
+#endif
+#if CLVOL_BSDF_ROUGH_CONDUCTOR
+    if (IS_BSDF(material, ROUGH_CONDUCTOR))
+        return rough_conductor_value(scene, material, uv, wi, wo, channel, pdf);
+#endif
+#if CLVOL_BSDF_PLASTIC
+    if (IS_BSDF(material, PLASTIC))
+        return plastic_value(scene, material, uv, wi, wo, channel, pdf);
+#endif
+#if CLVOL_BSDF_ROUGH_PLASTIC
+    if (IS_BSDF(material, ROUGH_PLASTIC))
+        return rough_plastic_value(scene, material, uv, wi, wo, channel, pdf);
+#endif
+    *pdf = 0.0f;
+    return (Spectrum)(0.0f);
+}
+
+/* Draws wo from three numbers: u, v for the direction and `choice` for the lobe.  False: absorbed, and the sample
+   holds nothing. */
+INLINE bool bsdf_sample(const Scene *scene, __global const Material *material, float2 uv, float3 wi, float u, float v,
+                        float choice, int channel, BsdfSample *sample)
+{
+#if CLVOL_BSDF_DIFFUSE
+    if (IS_BSDF(material, DIFFUSE))
+        return diffuse_sample(scene, material, uv, wi, u, v, channel, sample);
+#endif
+#if CLVOL_BSDF_DIELECTRIC
+    if (IS_BSDF(material, DIELECTRIC))
+        return dielectric_sample(scene, material, uv, wi, choice, channel, sample);
+#endif
+#if CLVOL_BSDF_THIN_DIELECTRIC
+    if (IS_BSDF(material, THIN_DIELECTRIC))
+        return thin_dielectric_sample(scene, material, uv, wi, choice, channel, sample);
+#endif
+#if CLVOL_BSDF_ROUGH_DIELECTRIC
+    if (IS_BSDF(material, ROUGH_DIELECTRIC))
+        return rough_dielectric_sample(scene, material, uv, wi, u, v, choice, channel, sample);
+#endif
+#if CLVOL_BSDF_CONDUCTOR
+    if (IS_BSDF(material, CONDUCTOR))
+        return conductor_sample(scene, material, uv, wi, channel, sample);
+#endif
+#if CLVOL_BSDF_ROUGH_CONDUCTOR
+    if (IS_BSDF(material, ROUGH_CONDUCTOR))
+        return rough_conductor_sample(scene, material, uv, wi, u, v, channel, sample);
+#endif
+#if CLVOL_BSDF_PLASTIC
+    if (IS_BSDF(material, PLASTIC))
+        return plastic_sample(scene, material, uv, wi, u, v, choice, channel, sample);
+#endif
+#if CLVOL_BSDF_ROUGH_PLASTIC
+    if (IS_BSDF(material, ROUGH_PLASTIC))
+        return rough_plastic_sample(scene, material, uv, wi, u, v, choice, channel, sample);
+#endif
+    delta_sample(sample, -wi, (Spectrum)(1.0f), 1.0f); /* null */
+    sample->passes = true;
+    return true;
+}
+
+#endif

@@ -1,0 +1,15 @@
+/* Smooth metal: one delta lobe. */
+#ifndef CLVOL_BSDF_CONDUCTOR_H
+#define CLVOL_BSDF_CONDUCTOR_H
+#include "bsdf/fresnel.h"
+#include "bsdf/sample.h"
+
+INLINE bool conductor_sample(const Scene *scene, __global const Material *material, float2 uv, float3 wi, int channel,
+                             BsdfSample *sample)
+{
+    const Spectrum weight = specular_reflectance(scene, material, uv, channel) *
+                            conductor_reflectance(material, wi.z, channel);
+    return delta_sample(sample, mirrored(wi), weight, 1.0f) && wi.z > 0.0f;
+}
+
+#endif

@@ -1,0 +1,155 @@
+/* Area lights: shapes whose front sends the same radiance from every point into every direction.
+
+   Points are drawn uniformly over the area, but for spheres seen from outside: there, directions are drawn
+   uniformly within the cone that the sphere subtends (Shirley, Wang, Zimmerman 1996).  Densities are per solid
+   angle at `from`: that of an area is dist² / (area cos).  Whether a point shows its front is decided by the same
+   geometric normal as `hit_surface` finds there. */
+#ifndef CLVOL_EMITTER_AREA_H
+#define CLVOL_EMITTER_AREA_H
+#include "core/sampling.h"
+#include "emitter/cdf.h"
+#include "emitter/light_sample.h"
+#include "geometry/surface.h"
+
+/* A sphere as seen from a point outside. */
+typedef struct {
+    float3 axis; /* unit, to the centre */
+    float distance;
+    float radius;
+    float one_minus_cos; /* of half the angle it subtends */
+} SphereCone;
+
+/* Returns false where a sphere is sampled by area: from inside, and if it emits inwards.  1 - cos is taken from the
+   sine, so that it stays right for the smallest and the farthest (METHODS §7). */
+INLINE bool sphere_cone(__global const Shape *shape, float3 from, SphereCone *cone)
+{
+    __global const float *m = shape->world_from_local;
+    const float3 to = (float3)(m[3], m[7], m[11]) - from;
+    const float radius = sqrt(m[0] * m[0] + m[4] * m[4] + m[8] * m[8]), distance = sqrt(dot(to, to));
+    if (shape->flip || !(distance > radius))
+        return false;
+    const float sine = radius / distance;
+    const float cosine = sqrt((distance - radius) * (distance + radius)) / distance;
+    cone->axis = to / distance;
+    cone->distance = distance;
+    cone->radius = radius;
+    cone->one_minus_cos = sine * sine / (1.0f + cosine);
+    return true;
+}
+
+INLINE float cone_pdf(const SphereCone *cone) { return 1.0f / (2.0f * PI * cone->one_minus_cos); }
+
+/* A direction uniform within the cone, and how far the sphere is along it. */
+INLINE float3 cone_direction(const SphereCone *cone, float u, float v, float *distance)
+{
+    const float h = u * cone->one_minus_cos; /* 1 - cos of the angle to the axis */
+    const float sine = sqrt(h * (2.0f - h)), cosine = 1.0f - h;
+    const float2 turn = cos_sin_turn(v);
+    const float miss = cone->distance * sine; /* how close the line comes to the centre */
+    const float half_chord = sqrt(max_of((cone->radius - miss) * (cone->radius + miss), 0.0f));
+    /* the smaller root of the quadratic, without the difference of near and equal numbers */
+    *distance = (cone->distance - cone->radius) * (cone->distance + cone->radius) /
+                (cone->distance * cosine + half_chord);
+    return to_frame(cone->axis, sine * turn.x, sine * turn.y, cosine);
+}
+
+#if CLVOL_HAS_AREA_MESH
+/* Uniform over a mesh: a triangle in proportion to its area, then a point of it. */
+INLINE float3 mesh_point(const Scene *scene, __global const Emitter *emitter, float choice, float u, float v, float3 *ng)
+{
+    const int entry = cdf_search(scene->light_cdf + emitter->first, emitter->count, choice);
+    const float root = sqrt(u);
+    Hit hit;
+    hit.t = 0.0f;
+    hit.primitive = scene->light_faces[emitter->first + entry];
+    hit.u = root * (1.0f - v);
+    hit.v = root * v;
+    Surface surface;
+    triangle_surface(scene, &hit, scene->shapes + emitter->shape, &surface);
+    *ng = surface.ng;
+    return surface.p;
+}
+#endif
+
+/* A point uniform over the light's area, and the unit normal of its front there. */
+INLINE float3 area_point(const Scene *scene, __global const Emitter *emitter, float choice, float u, float v, float3 *ng)
+{
+    __global const Shape *shape = scene->shapes + emitter->shape;
+#if CLVOL_HAS_AREA_MESH
+    if (shape->kind == SURFACE_MESH)
+        return mesh_point(scene, emitter, choice, u, v, ng);
+#endif
+    __global const float *world = shape->world_from_local, *inverse = shape->local_from_world;
+    const float2 turn = cos_sin_turn(v);
+    float3 p, n;
+    if (CLVOL_HAS_AREA_SPHERE && shape->kind == SURFACE_SPHERE) {
+        p = sphere_direction(u, v);
+        n = transform_vector(world, p);
+    } else if (CLVOL_HAS_AREA_DISK && shape->kind == SURFACE_DISK) {
+        const float r = sqrt(u);
+        p = (float3)(r * turn.x, r * turn.y, 0.0f);
+        n = (float3)(inverse[8], inverse[9], inverse[10]);
+    } else { /* a cylinder, round in the world too */
+        p = (float3)(turn.x, turn.y, u);
+        n = transform_vector(world, (float3)(turn.x, turn.y, 0.0f));
+    }
+    n = normalize(n);
+    *ng = shape->flip ? -n : n;
+    return transform_point(world, p);
+}
+
+/* Fills in a sample of the light; `choice` is a third uniform number. */
+INLINE void sample_area(const Scene *scene, __global const Emitter *emitter, float3 from, float choice, float u, float v,
+                        LightSample *light)
+{
+    __global const Shape *shape = scene->shapes + emitter->shape;
+    SphereCone cone;
+    if (CLVOL_HAS_AREA_SPHERE && shape->kind == SURFACE_SPHERE && sphere_cone(shape, from, &cone)) {
+        light->direction = cone_direction(&cone, u, v, &light->distance);
+        light->pdf = emitter->select_pdf * cone_pdf(&cone);
+        light->value = emitter_value(emitter) / light->pdf;
+        return;
+    }
+    float3 ng;
+    const float3 to = area_point(scene, emitter, choice, u, v, &ng) - from;
+    const float square = dot(to, to);
+    light->distance = sqrt(square);
+    light->direction = to / max_of(light->distance, 1e-30f);
+    const float facing = -dot(ng, light->direction) * emitter->area; /* the area as it is seen from `from` */
+    light->value = (float3)(0.0f);
+    light->pdf = 0.0f;
+    if (facing > 0.0f) {
+        light->pdf = emitter->select_pdf * square / facing;
+        light->value = emitter_value(emitter) * (facing / (emitter->select_pdf * square));
+    }
+}
+
+/* The area light that a ray in direction d sees at the surface, or NULL: no light, or its back. */
+INLINE __global const Emitter *seen_light(const Scene *scene, const Surface *surface, float3 d)
+{
+    const int number = scene->shapes[surface->shape].emitter;
+    return number >= 0 && dot(surface->ng, d) < 0.0f ? scene->emitters + number : 0;
+}
+
+/* Radiance that a ray with direction of travel d meets at the surface. */
+INLINE float3 area_radiance(const Scene *scene, const Surface *surface, float3 d)
+{
+    __global const Emitter *emitter = seen_light(scene, surface, d);
+    return emitter ? emitter_value(emitter) : (float3)(0.0f);
+}
+
+/* Density with which sample_light(from) would have chosen the unit direction d in which the surface is `distance`
+   away; `from` must be the very point that lights are sampled from. */
+INLINE float area_pdf(const Scene *scene, const Surface *surface, float3 from, float3 d, float distance)
+{
+    __global const Emitter *emitter = seen_light(scene, surface, d);
+    if (!emitter)
+        return 0.0f;
+    __global const Shape *shape = scene->shapes + surface->shape;
+    SphereCone cone;
+    if (CLVOL_HAS_AREA_SPHERE && shape->kind == SURFACE_SPHERE && sphere_cone(shape, from, &cone))
+        return emitter->select_pdf * cone_pdf(&cone);
+    return emitter->select_pdf * distance * distance / (emitter->area * -dot(surface->ng, d));
+}
+
+#endif

@@ -1,0 +1,17 @@
+/* What next-event estimation draws: one direction towards one light. */
+#ifndef CLVOL_EMITTER_LIGHT_SAMPLE_H
+#define CLVOL_EMITTER_LIGHT_SAMPLE_H
+
+typedef struct {
+    float3 direction; /* towards the light */
+    float distance;   /* to the light's point */
+    float3 value;     /* light arriving, over the probability of this choice */
+    float pdf;        /* of the direction, choice of light included; 0: no other way to find it (no MIS) */
+} LightSample;
+
+INLINE float3 emitter_value(__global const Emitter *emitter)
+{
+    return (float3)(emitter->value[0], emitter->value[1], emitter->value[2]);
+}
+
+#endif

@@ -1,0 +1,29 @@
+/* Spot lights: a point light whose intensity falls in a straight line with the angle off its axis, from all at the
+   beam's width to nothing at the cutoff (Mitsuba's). */
+#ifndef CLVOL_EMITTER_SPOT_H
+#define CLVOL_EMITTER_SPOT_H
+#include "emitter/light_sample.h"
+
+/* Share of the intensity that travels along d, a unit vector. */
+INLINE float spot_falloff(__global const Emitter *emitter, float3 d)
+{
+    const float3 axis = (float3)(emitter->vector[0], emitter->vector[1], emitter->vector[2]);
+    const float3 across = cross(axis, d);
+    const float angle = atan2(sqrt(dot(across, across)), dot(axis, d)); /* a cosine is blind near the axis */
+    if (angle <= emitter->beam_width)
+        return 1.0f;
+    if (!(angle < emitter->cutoff_angle))
+        return 0.0f;
+    return (emitter->cutoff_angle - angle) / (emitter->cutoff_angle - emitter->beam_width);
+}
+
+INLINE void sample_spot(__global const Emitter *emitter, float3 from, LightSample *light)
+{
+    const float3 to = (float3)(emitter->position[0], emitter->position[1], emitter->position[2]) - from;
+    light->distance = sqrt(dot(to, to));
+    light->direction = to / light->distance;
+    light->value = emitter_value(emitter) * (spot_falloff(emitter, -light->direction) /
+                                             (emitter->select_pdf * light->distance * light->distance));
+}
+
+#endif

@@ -1,0 +1,156 @@
+/* The point of a surface that a ray has hit, as BSDFs and lights take it. */
+#ifndef CLVOL_GEOMETRY_SURFACE_H
+#define CLVOL_GEOMETRY_SURFACE_H
+#include "core/sampling.h"
+#include "geometry/bvh.h"
+
+typedef struct {
+    float3 p;
+    float3 ng;   /* geometric normal, unit; points to the shape's front */
+    float3 s, t; /* tangents; with the shading normal n they make an orthonormal, right-handed frame */
+    float3 n;
+    float2 uv;
+    uint shape;
+} Surface;
+
+INLINE float3 to_local(const Surface *surface, float3 world)
+{
+    return (float3)(dot(world, surface->s), dot(world, surface->t), dot(world, surface->n));
+}
+
+INLINE float3 to_world(const Surface *surface, float3 d)
+{
+    return d.x * surface->s + d.y * surface->t + d.z * surface->n;
+}
+
+/* Frame round the normal n whose first tangent follows dp/du, any where that is none. */
+INLINE void set_frame(Surface *surface, float3 n, float3 dp_du)
+{
+    float3 s = dp_du - n * dot(n, dp_du);
+    const float square = dot(s, s);
+    surface->n = n;
+    surface->s = square > 1e-20f * dot(dp_du, dp_du) ? s / sqrt(square) : to_frame(n, 1.0f, 0.0f, 0.0f);
+    surface->t = cross(n, surface->s);
+}
+
+/* The shape that a primitive belongs to. */
+INLINE uint primitive_shape(const Scene *scene, uint primitive)
+{
+#if CLVOL_HAS_QUADRICS
+    const uint triangles = scene->render->triangles;
+    if (!CLVOL_HAS_TRIANGLES || primitive >= triangles)
+        return scene->quadrics[primitive - triangles].shape;
+#endif
+#if CLVOL_HAS_TRIANGLES
+    return scene->faces[4 * primitive + 3];
+#endif
+}
+
+#if CLVOL_HAS_TRIANGLES
+INLINE float3 vertex(const Scene *scene, uint number) { return vload3(number, scene->vertices); }
+
+INLINE void triangle_surface(const Scene *scene, const Hit *hit, __global const Shape *shape, Surface *surface)
+{
+    __global const uint *face = scene->faces + 4 * hit->primitive;
+    const float3 a = vertex(scene, face[0]), b = vertex(scene, face[1]), c = vertex(scene, face[2]);
+    const float u = hit->u, v = hit->v, w = 1.0f - u - v;
+    const float3 e1 = b - a, e2 = c - a;
+    surface->p = a + u * e1 + v * e2;
+    surface->ng = normalize(cross(e1, e2));
+    surface->uv = (float2)(u, v);
+    float3 dp_du = e1;
+#if CLVOL_HAS_VERTEX_UVS
+    if (shape->uvs) {
+        const float2 ta = vload2(face[0], scene->uvs), tb = vload2(face[1], scene->uvs), tc = vload2(face[2], scene->uvs);
+        const float2 d1 = tb - ta, d2 = tc - ta;
+        const float determinant = d1.x * d2.y - d1.y * d2.x;
+        surface->uv = w * ta + u * tb + v * tc;
+        if (determinant != 0.0f)
+            dp_du = (d2.y * e1 - d1.y * e2) / determinant;
+    }
+#endif
+    float3 n = surface->ng;
+#if CLVOL_HAS_SHADING_NORMALS
+    if (shape->normals) {
+        const float3 smooth = w * vload3(face[0], scene->normals) + u * vload3(face[1], scene->normals) +
+                              v * vload3(face[2], scene->normals);
+        const float square = dot(smooth, smooth);
+        if (square > 0.0f)
+            n = smooth / sqrt(square);
+    }
+#endif
+    if (shape->flip) {
+        surface->ng = -surface->ng;
+        n = -n;
+    }
+    set_frame(surface, n, dp_du);
+}
+#endif
+
+#if CLVOL_HAS_QUADRICS
+INLINE void quadric_surface(const Scene *scene, Ray ray, const Hit *hit, __global const Shape *shape, Surface *surface)
+{
+    float3 p = transform_point(shape->local_from_world, ray.o + hit->t * ray.d);
+    float3 normal, dp_du;
+    if (shape->kind == SURFACE_DISK) {
+        p.z = 0.0f;
+        const float r = sqrt(p.x * p.x + p.y * p.y);
+        normal = (float3)(0.0f, 0.0f, 1.0f);
+        dp_du = r > 0.0f ? (float3)(p.x, p.y, 0.0f) : (float3)(1.0f, 0.0f, 0.0f);
+        const float turn = atan2(p.y, p.x) * (0.5f / PI);
+        surface->uv = (float2)(r, turn < 0.0f ? turn + 1.0f : turn);
+    } else {
+        const float turn = atan2(p.y, p.x) * (0.5f / PI);
+        const float around = turn < 0.0f ? turn + 1.0f : turn;
+        if (shape->kind == SURFACE_SPHERE) {
+            p = normalize(p); /* back on the surface: the ray parameter has lost more than the shape has */
+            normal = p;
+            surface->uv = (float2)(around, acos(clamp_to(p.z, -1.0f, 1.0f)) * (1.0f / PI));
+        } else {
+            const float r = sqrt(p.x * p.x + p.y * p.y);
+            p.x /= r, p.y /= r;
+            normal = (float3)(p.x, p.y, 0.0f);
+            surface->uv = (float2)(around, p.z);
+        }
+        dp_du = p.x != 0.0f || p.y != 0.0f ? (float3)(-p.y, p.x, 0.0f) : (float3)(1.0f, 0.0f, 0.0f);
+    }
+    surface->p = transform_point(shape->world_from_local, p);
+    /* normals go by the inverse transpose */
+    __global const float *m = shape->local_from_world;
+    float3 n = normalize((float3)(m[0] * normal.x + m[4] * normal.y + m[8] * normal.z,
+                                  m[1] * normal.x + m[5] * normal.y + m[9] * normal.z,
+                                  m[2] * normal.x + m[6] * normal.y + m[10] * normal.z));
+    n = shape->flip ? -n : n;
+    surface->ng = n;
+    set_frame(surface, n, transform_vector(shape->world_from_local, dp_du));
+}
+#endif
+
+INLINE Surface hit_surface(const Scene *scene, Ray ray, const Hit *hit)
+{
+    Surface surface;
+    surface.shape = primitive_shape(scene, hit->primitive);
+    __global const Shape *shape = scene->shapes + surface.shape;
+#if CLVOL_HAS_QUADRICS
+    if (!CLVOL_HAS_TRIANGLES || shape->kind != SURFACE_MESH) {
+        quadric_surface(scene, ray, hit, shape, &surface);
+        return surface;
+    }
+#endif
+#if CLVOL_HAS_TRIANGLES
+    triangle_surface(scene, hit, shape, &surface);
+#endif
+    return surface;
+}
+
+/* A point just off the surface, on the side of `ng` that d points to: moved along the normal by some units in the
+   last place of every coordinate (after Wächter and Binder 2019), so that the new ray does not meet it again. */
+INLINE float3 spawn_point(float3 p, float3 ng, float3 d)
+{
+    const float3 n = dot(ng, d) < 0.0f ? -ng : ng;
+    const float largest = largest3(p);
+    const float distance = (largest + 1e-30f) * 0x1p-20f; /* 8 units in the last place of the largest */
+    return p + distance * n;
+}
+
+#endif

@@ -1,0 +1,77 @@
+/* Which media a ray is in, and where.
+
+   A medium is bounded by an interval of the ray, or by boundaries, of which a path carries one bit each.  It is
+   present as often as boundaries hold it, less those that keep it out (METHODS §6); as often as that its
+   coefficients count. */
+#ifndef CLVOL_STAGES_MEDIA_H
+#define CLVOL_STAGES_MEDIA_H
+#include "stages/medium_ray.h"
+
+INLINE int medium_presence(const Scene *scene, uint m, const Inside *inside)
+{
+    int presence = scene->media[m].presence;
+#if CLVOL_BOUNDARY_WORDS > 0
+    __global const uint *holds = scene->boundary_masks + 2 * CLVOL_BOUNDARY_WORDS * m;
+    for (int w = 0; w < CLVOL_BOUNDARY_WORDS; ++w)
+        presence += (int)popcount(inside->word[w] & holds[w]) -
+                    (int)popcount(inside->word[w] & holds[CLVOL_BOUNDARY_WORDS + w]);
+#endif
+    return presence;
+}
+
+/* The part of the ray between `from` and `to` that lies in medium m; false where there is none. */
+INLINE bool medium_part(const Scene *scene, uint m, Ray ray, const Inside *inside, float from, float to, float *t0,
+                        float *t1)
+{
+    *t0 = from;
+    *t1 = to;
+    if (CLVOL_BOUNDARY_WORDS > 0 && medium_presence(scene, m, inside) <= 0)
+        return false;
+    medium_interval(scene->media + m, ray, t0, t1);
+    return *t0 < *t1;
+}
+
+/* One medium on a stretch of a ray. */
+typedef struct {
+    int medium; /* -1: none yet */
+    float start, end;
+} Part;
+
+/* The next part, in the order of entry, ties by number, that begins before `limit`; false at the last. */
+INLINE bool next_part(const Scene *scene, Ray ray, const Inside *inside, float from, float to, float limit, Part *part)
+{
+    Part next = {-1, limit, limit};
+    for (int m = 0; m < (int)scene->render->media; ++m) {
+        float t0, t1;
+        if (!medium_part(scene, (uint)m, ray, inside, from, to, &t0, &t1))
+            continue;
+        const bool is_later = part->medium < 0 || t0 > part->start || (t0 == part->start && m > part->medium);
+        if (is_later && t0 < next.start) {
+            next.medium = m;
+            next.start = t0;
+            next.end = t1;
+        }
+    }
+    *part = next;
+    return next.medium >= 0;
+}
+
+/* The medium's coefficients where it is present several times. */
+INLINE MediumRay part_ray(const Scene *scene, const Inside *inside, int m, Ray world, float length, int channel)
+{
+    MediumRay in = medium_ray(scene, scene->media + m, world, min_of(length, 1e30f), channel);
+#if CLVOL_BOUNDARY_WORDS > 0
+    const float presence = (float)medium_presence(scene, (uint)m, inside);
+    in.scale *= presence;
+    in.rate *= presence;
+#endif
+    return in;
+}
+
+/* Which of the random numbers of a bounce a walk takes. */
+INLINE uint walk_number(const Scene *scene, uint stretch, int m)
+{
+    return stretch * scene->render->media + (uint)m;
+}
+
+#endif

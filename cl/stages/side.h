@@ -1,0 +1,26 @@
+/* The material of the side that a surface is seen from. */
+#ifndef CLVOL_STAGES_SIDE_H
+#define CLVOL_STAGES_SIDE_H
+
+/* A surface as the side it is seen from has it.  Materials that do not let light through are always seen
+   from their front. */
+typedef struct {
+    __global const Material *material;
+    float side; /* -1 turns local directions round for the back, else 1 */
+} Side;
+
+INLINE bool side_of(const Scene *scene, __global const Shape *shape, float3 wi, Side *side)
+{
+    const int number = wi.z > 0.0f ? shape->front : shape->back;
+    side->material = scene->materials + number;
+    side->side = 1.0f;
+    if (number < 0)
+        return false;
+    if (wi.z < 0.0f && !material_transmits(side->material))
+        side->side = -1.0f;
+    return true;
+}
+
+INLINE float3 on_side(const Side *side, float3 d) { return (float3)(d.x, d.y, side->side * d.z); }
+
+#endif

@@ -1,0 +1,82 @@
+/* Several media, or media and surfaces: walks all that lie on the stretch of ray up to the next surface.
+
+   Media that overlap compete as independent processes: a walk ends at the nearest collision found so far, and the
+   nearest of all wins.  Weights are those of every walk up to that collision (METHODS §6): the walks that went
+   beyond it before it was known are repeated, with the same random numbers, only as far.  In the mean, the walk
+   that collides contributes sigma_t T of its medium and each of the others its T. */
+#ifndef CLVOL_STAGES_STRETCH_SAMPLE_H
+#define CLVOL_STAGES_STRETCH_SAMPLE_H
+
+/* The factor by which a walk changed the path's weight; what had no weight keeps none. */
+INLINE Spectrum weight_ratio(Spectrum after, Spectrum before)
+{
+#if CLVOL_SPECTRUM == 1
+    return before != 0.0f ? after / before : 0.0f;
+#else
+    return (Spectrum)(before.x != 0.0f ? after.x / before.x : 0.0f, before.y != 0.0f ? after.y / before.y : 0.0f,
+                      before.z != 0.0f ? after.z / before.z : 0.0f);
+#endif
+}
+
+/* Weights multiply, each walk's taken from what the path weighed before all of them. */
+#define JOINT_WEIGHTS (CLVOL_WEIGHTED && CLVOL_HAS_OVERLAP)
+
+INLINE void medium_sample(const Scene *scene, uint group, uint slot)
+{
+    const SampleKey key = path_key(scene, slot);
+    const Ray ray = path_ray(scene, slot);
+    const Inside inside = get_inside(scene, slot);
+    const uint stretch = path_stretch_or_zero(scene, slot);
+    const float from = path_after(scene, slot), to = path_reach(scene, slot);
+    const Spectrum before = get_beta(scene, slot);
+    Tally tally = {0, 0, 0, 0, 0, 0, 0.0f};
+    Collision collision;
+    collision.emission = (Spectrum)(0.0f);
+    Spectrum beta = before, winning = before;
+    float limit = min_of(to, ray_limit(scene, slot, ray)); /* nothing that begins beyond counts */
+    float reach = to;
+    int winner = -1;
+    for (int pass = 0; pass < (JOINT_WEIGHTS ? 2 : 1); ++pass) {
+        if (pass == 1) {
+            if (winner < 0)
+                break;
+            beta = winning;
+        }
+        Part part = {-1, 0.0f, 0.0f};
+        while (next_part(scene, ray, &inside, from, to, limit, &part)) {
+            if (pass == 1 && part.medium == winner)
+                continue;
+            Ray start = ray;
+            start.o += part.start * ray.d;
+            const MediumRay in = part_ray(scene, &inside, part.medium, start, min_of(part.end, reach) - part.start,
+                                          (int)path_channel_or_zero(scene, slot));
+            const uint4 k = decision_block(render_seed(scene), key, BLOCK_WALK, walk_number(scene, stretch, part.medium));
+            collision.beta = JOINT_WEIGHTS ? before : beta;
+            const bool collided = medium_collision(&in, k, &tally, &collision);
+            beta = JOINT_WEIGHTS ? beta * weight_ratio(collision.beta, before) : collision.beta;
+            if (collided && pass == 0) {
+                winner = part.medium;
+                winning = collision.beta;
+                limit = reach = part.start + collision.t;
+                if (!CLVOL_HAS_OVERLAP)
+                    break;
+            }
+        }
+    }
+#if CLVOL_WEIGHTED
+    Part first = {-1, 0.0f, 0.0f};
+    if (next_part(scene, ray, &inside, from, to, INFINITY, &first))
+        subtract_background(scene, slot, scene->media + first.medium, (int)path_channel_or_zero(scene, slot), beta);
+#endif
+    record_walk(scene, slot, tally, beta, collision.emission);
+    if (winner >= 0) {
+#if CLVOL_HAS_MANY_MEDIA
+        set_path_medium(scene, slot, winner);
+#endif
+        set_path_origin(scene, slot, ray.o + reach * ray.d);
+        set_path_event(scene, slot, EVENT_COLLISION);
+    }
+    queue_push(scene, group, QUEUE_SHADE, slot);
+}
+
+#endif

@@ -1,0 +1,148 @@
+/* What happens to a path at a surface: it gathers the light of a lamp, passes on, is absorbed, or scatters by the
+   surface's BSDF. */
+#ifndef CLVOL_STAGES_SURFACE_SCATTER_H
+#define CLVOL_STAGES_SURFACE_SCATTER_H
+
+#if CLVOL_HAS_PASSABLE
+/* The ray goes straight on behind the surface: no scattering, and no bounce. */
+INLINE bool pass_on(const Scene *scene, uint slot, Ray ray, const Hit *hit, const Surface *surface)
+{
+    Inside inside = get_inside(scene, slot);
+    cross_boundary(scene->shapes + surface->shape, surface->ng, ray.d, &inside);
+    set_inside(scene, slot, inside);
+    set_path_after_t(scene, slot, hit->t);
+    set_path_after_primitive(scene, slot, hit->primitive);
+    const uint stretch = path_stretch(scene, slot) + 1;
+    set_path_stretch(scene, slot, stretch);
+    return stretch < MOST_PASSED;
+}
+#endif
+
+#if CLVOL_HAS_AREA
+/* Light of a lamp that the path has run into. */
+INLINE void gather_lamp(const Scene *scene, uint slot, Ray ray, const Hit *hit, const Surface *surface)
+{
+    if (CLVOL_HIDE_EMITTERS && path_bounce(scene, slot) == 0)
+        return;
+#if CLVOL_HAS_MAX_DEPTH
+    if (scene->render->max_depth == 0)
+        return;
+#endif
+    const float3 rgb = area_radiance(scene, surface, ray.d);
+    Spectrum radiance = get_beta(scene, slot) * to_spectrum(rgb, (int)path_channel_or_zero(scene, slot));
+#if CLVOL_MIS
+    const float pdf = path_pdf(scene, slot);
+    if (pdf > 0.0f)
+        radiance *= mis_weight(pdf, area_pdf(scene, surface, ray.o, ray.d, hit->t));
+#endif
+    set_radiance(scene, slot, get_radiance(scene, slot) + radiance);
+}
+#endif
+
+/* Next-event estimation from a surface: queues a shadow ray towards one light. */
+INLINE void surface_next_event(const Scene *scene, uint group, uint slot, SampleKey key, const Surface *surface,
+                               const Side *side, float3 wi, Spectrum beta)
+{
+#if CLVOL_NEE
+    if (material_is_smooth(side->material))
+        return;
+    const uint4 k = decision_block(render_seed(scene), key, BLOCK_LIGHT, 0);
+    const LightSample light =
+        sample_light(scene, surface->p, uniform_below_one(k.x), uniform_below_one(k.y), uniform_below_one(k.z));
+    float pdf;
+    const int channel = (int)path_channel_or_zero(scene, slot);
+    const Spectrum f = bsdf_value(scene, side->material, surface->uv, on_side(side, wi),
+                                  on_side(side, to_local(surface, light.direction)), channel, &pdf);
+    const float weight = light.pdf > 0.0f ? mis_weight(light.pdf, pdf) : 1.0f;
+    const Spectrum value = beta * f * to_spectrum(light.value, channel) * weight;
+    if (!(spectrum_max(value) > 0.0f))
+        return;
+    Inside inside = get_inside(scene, slot);
+    cross_boundary(scene->shapes + surface->shape, surface->ng, light.direction, &inside);
+    set_shadow_inside(scene, slot, inside);
+    queue_shadow(scene, group, slot, spawn_point(surface->p, surface->ng, light.direction), &light, value);
+#endif
+}
+
+/* The path goes on along the sampled direction; false where roulette ends it. */
+INLINE bool leave_surface(const Scene *scene, uint slot, SampleKey key, const Surface *surface, float3 d, float pdf,
+                          float eta, Spectrum beta)
+{
+    float survival = spectrum_max(beta);
+#if CLVOL_HAS_TRANSMISSION
+    const float eta_squared = path_eta_squared(scene, slot) * eta * eta;
+    set_path_eta_squared(scene, slot, eta_squared);
+    survival *= eta_squared;
+#endif
+    if (!(survival > 0.0f))
+        return false;
+    if (key.bounce > scene->render->rr_depth && survival < 1.0f) {
+        const uint4 k = decision_block(render_seed(scene), key, BLOCK_DIRECTION, 0);
+        if (!(uniform_float(k.z) < survival))
+            return false;
+        beta /= survival;
+    }
+    Inside inside = get_inside(scene, slot);
+    cross_boundary(scene->shapes + surface->shape, surface->ng, d, &inside);
+    set_inside(scene, slot, inside);
+    set_path_origin(scene, slot, spawn_point(surface->p, surface->ng, d));
+    set_path_direction(scene, slot, d);
+    set_beta(scene, slot, beta);
+#if CLVOL_MIS
+    set_path_pdf(scene, slot, pdf);
+#endif
+    reset_ray(scene, slot);
+    return true;
+}
+
+/* Returns false when the path ends at the surface. */
+INLINE bool shade_surface(const Scene *scene, uint group, uint slot)
+{
+    const Ray ray = path_ray(scene, slot);
+    const Hit hit = path_hit(scene, slot);
+    const Surface surface = hit_surface(scene, ray, &hit);
+    __global const Shape *shape = scene->shapes + surface.shape;
+#if CLVOL_HAS_AREA
+    if (shape->emitter >= 0)
+        gather_lamp(scene, slot, ray, &hit, &surface);
+#endif
+    const float3 wi = to_local(&surface, -ray.d);
+    SampleKey key = path_key(scene, slot);
+    Side side;
+    if (!side_of(scene, shape, wi, &side))
+        return false;
+    const uint4 k = decision_block(render_seed(scene), key, BLOCK_SURFACE, path_stretch_or_zero(scene, slot));
+#if CLVOL_HAS_PASSABLE
+    if (side.material->kind == MATERIAL_NULL)
+        return pass_on(scene, slot, ray, &hit, &surface);
+    const float opacity = material_opacity(scene, side.material, surface.uv);
+    if (opacity < 1.0f && !choose_event(k.x, opacity, 1.0f - opacity))
+        return pass_on(scene, slot, ray, &hit, &surface);
+#endif
+#if CLVOL_HAS_REFLECTION
+    BsdfSample sample;
+    Spectrum beta = get_beta(scene, slot);
+    const bool sampled =
+        bsdf_sample(scene, side.material, surface.uv, on_side(&side, wi), uniform_below_one(k.y),
+                    uniform_below_one(k.z), uniform_float(k.w), (int)path_channel_or_zero(scene, slot), &sample);
+#if CLVOL_HAS_PASSABLE
+    if (sampled && sample.passes) {
+        set_beta(scene, slot, beta * sample.weight);
+        return pass_on(scene, slot, ray, &hit, &surface);
+    }
+#endif
+    key.bounce += 1;
+    if (depth_is_reached(scene, slot, key.bounce, beta))
+        return false;
+    set_path_bounce(scene, slot, key.bounce); /* also numbers the shadow ray's random numbers */
+    surface_next_event(scene, group, slot, key, &surface, &side, wi, beta);
+    if (!sampled)
+        return false;
+    const float3 d = normalize(to_world(&surface, on_side(&side, sample.direction)));
+    return leave_surface(scene, slot, key, &surface, d, sample.pdf, sample.eta, beta * sample.weight);
+#else
+    return false;
+#endif
+}
+
+#endif

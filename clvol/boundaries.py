@@ -1,0 +1,198 @@
+"""Which shapes are surfaces that rays meet, and what bounds each medium.
+
+A cube or sphere without a surface that only holds a medium is no surface: its medium is an *interval* of a ray,
+worked out afresh for every ray.  Every other shape with media is a *boundary*: a path carries one bit for each,
+set while it is inside, and a medium is present as often as boundaries that hold it, less those that name it as
+their exterior, say (METHODS §6).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from clvol.scene import records
+from clvol.scene.materials import Null
+
+CONVEX = ("cube", "sphere")
+"""Kinds of shape that a ray meets in one interval, found in closed form."""
+
+
+@dataclass(frozen=True, eq=False)
+class MediumEntry:
+    """One medium as the device knows it.
+
+    shape : the shape whose interval bounds it, or None where boundaries do.
+    everywhere : it fills all that no boundary takes away: a medium that is only ever an exterior.
+    """
+
+    medium: records.Medium
+    shape: records.Shape | None = None
+    everywhere: bool = False
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """A shape that divides media: its index among the scene's shapes, and entries (-1: none)."""
+
+    shape: int
+    interior: int
+    exterior: int
+
+
+@dataclass(frozen=True, eq=False)
+class Boundaries:
+    """How a scene's shapes are used.
+
+    surfaces : indices of the shapes that rays meet, in the scene's order.
+    entries : the media.  boundaries : in the order of their bits.
+    """
+
+    surfaces: tuple[int, ...]
+    entries: tuple[MediumEntry, ...]
+    boundaries: tuple[Boundary, ...]
+
+    @property
+    def words(self) -> int:
+        """32-bit words that hold a path's bits."""
+        return -(-len(self.boundaries) // 32)
+
+    def masks(self) -> np.ndarray:
+        """uint32 (entries, 2, words): for each medium, the boundaries that hold it, and that keep it out."""
+        found = np.zeros((len(self.entries), 2, self.words), np.uint32)
+        for bit, boundary in enumerate(self.boundaries):
+            for side, entry in enumerate((boundary.interior, boundary.exterior)):
+                if entry >= 0:
+                    found[entry, side, bit // 32] |= np.uint32(1 << (bit % 32))
+        return found
+
+
+def find_boundaries(scene: records.Scene) -> Boundaries:
+    """Sort a scene's shapes into surfaces, intervals and boundaries; a pure function of the records."""
+    shapes = scene.shapes
+    exteriors = {id(s.exterior) for s in shapes if s.exterior is not None}
+    holders = Counter(id(s.interior) for s in shapes if s.interior is not None)
+    entries: list[MediumEntry] = []
+    entry_of: dict[int, int] = {}  # of media that boundaries name
+    surfaces, dividing = [], []
+    for index, shape in enumerate(shapes):
+        if _is_interval(shape, exteriors, holders):
+            if id(shape.interior) in exteriors:
+                entry_of[id(shape.interior)] = len(entries)
+            entries.append(MediumEntry(shape.interior, shape))
+            continue
+        divides = shape.interior is not shape.exterior
+        if divides:
+            dividing.append(index)
+        if divides or shape.emission is not None or not isinstance(shape.bsdf, Null):
+            surfaces.append(index)
+    for index in dividing:
+        shape = shapes[index]
+        for medium in (shape.interior, shape.exterior):
+            if medium is not None and id(medium) not in entry_of:
+                entry_of[id(medium)] = len(entries)
+                entries.append(MediumEntry(medium, None, id(medium) not in holders))
+    boundaries = tuple(
+        Boundary(
+            index,
+            *(-1 if m is None else entry_of[id(m)] for m in (shapes[index].interior, shapes[index].exterior)),
+        )
+        for index in dividing
+    )
+    return Boundaries(tuple(surfaces), tuple(entries), boundaries)
+
+
+def _is_interval(shape: records.Shape, exteriors: set[int], holders: Counter[int]) -> bool:
+    """Whether the shape only holds a medium, in an interval of any ray; what several shapes hold and others
+    keep out has to be counted."""
+    return (
+        shape.kind in CONVEX
+        and isinstance(shape.bsdf, Null)
+        and shape.emission is None
+        and shape.interior is not None
+        and shape.exterior is None
+        and not shape.flip_normals
+        and not (id(shape.interior) in exteriors and holders[id(shape.interior)] > 1)
+    )
+
+
+def shape_bounds(shape: records.Shape) -> tuple[np.ndarray, np.ndarray]:
+    """Axis-aligned world bounds (lower, upper) of a shape, float64 (3,)."""
+    linear, centre = shape.to_world[:3, :3], shape.to_world[:3, 3]
+    if shape.kind == "mesh":
+        return mesh_bounds(shape)
+    if shape.kind == "sphere":
+        extent = np.sqrt((linear**2).sum(axis=1))
+    elif shape.kind == "cube":
+        extent = np.abs(linear).sum(axis=1)
+    elif shape.kind == "rectangle":
+        extent = np.abs(linear[:, :2]).sum(axis=1)
+    else:
+        extent = np.sqrt((linear[:, :2] ** 2).sum(axis=1))
+        if shape.kind == "cylinder":
+            top = centre + linear[:, 2]
+            return np.minimum(centre, top) - extent, np.maximum(centre, top) + extent
+    return centre - extent, centre + extent
+
+
+def mesh_bounds(shape: records.Shape) -> tuple[np.ndarray, np.ndarray]:
+    """World bounds of the vertices that faces use."""
+    used = np.unique(shape.mesh.faces)
+    linear, offset = shape.to_world[:3, :3], shape.to_world[:3, 3]
+    lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
+    for start in range(0, len(used), 1 << 16):
+        points = shape.mesh.vertices[used[start : start + (1 << 16)]] @ linear.T + offset
+        lower, upper = np.minimum(lower, points.min(axis=0)), np.maximum(upper, points.max(axis=0))
+    return lower, upper
+
+
+def entry_bounds(scene: records.Scene, found: Boundaries) -> list[tuple[np.ndarray, np.ndarray]]:
+    """World bounds of each medium: of the shape, or of all boundaries that hold it; infinite where it is
+    everywhere."""
+    boxes = []
+    for number, entry in enumerate(found.entries):
+        if entry.everywhere:
+            boxes.append((np.full(3, -np.inf), np.full(3, np.inf)))
+            continue
+        held = [scene.shapes[b.shape] for b in found.boundaries if b.interior == number]
+        parts = [shape_bounds(s) for s in ([entry.shape] if entry.shape is not None else []) + held]
+        lower, upper = zip(*parts, strict=True)
+        boxes.append((np.min(lower, axis=0), np.max(upper, axis=0)))
+    return boxes
+
+
+def may_overlap(scene: records.Scene, found: Boundaries) -> bool:
+    """Conservative: whether two media may be present at one point, which they cannot where their bounds are
+    apart, or where all that holds the one keeps out the other."""
+    boxes = entry_bounds(scene, found)
+    for a in range(len(boxes)):
+        for b in range(a):
+            apart = (boxes[a][0] >= boxes[b][1]).any() or (boxes[b][0] >= boxes[a][1]).any()
+            if not (apart or _replaces(found, a, b) or _replaces(found, b, a)):
+                return True
+    return False
+
+
+def _replaces(found: Boundaries, inner: int, outer: int) -> bool:
+    """Whether every boundary of `inner` has `outer` as its exterior, and outer is held once at any point."""
+    holds = [b for b in found.boundaries if b.interior == inner]
+    entry = found.entries[outer]
+    held_once = entry.everywhere or (
+        entry.shape is not None or sum(b.interior == outer for b in found.boundaries) == 1
+    )
+    only = found.entries[inner].shape is None and bool(holds)
+    return only and held_once and all(b.exterior == outer for b in holds)
+
+
+def camera_may_be_inside(scene: records.Scene, found: Boundaries) -> bool:
+    """Conservative: whether rays may start within a boundary's bounds."""
+    sensor = scene.sensor
+    eye = sensor.to_world[:3, 3]
+    reach = 2.0 * sensor.near_clip * 16.0 + sensor.aperture_radius
+    for boundary in found.boundaries:
+        lower, upper = shape_bounds(scene.shapes[boundary.shape])
+        if (eye + reach >= lower).all() and (eye - reach <= upper).all():
+            return True
+    return False

@@ -1,0 +1,154 @@
+"""What a BSDF does, as far as it decides which code a scene needs; pure functions of the records."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from clvol.scene.materials import (
+    Bitmap,
+    Bsdf,
+    Checkerboard,
+    Conductor,
+    Dielectric,
+    Diffuse,
+    Mask,
+    Null,
+    Plastic,
+    RoughConductor,
+    RoughDielectric,
+    RoughPlastic,
+    Texture,
+    TwoSided,
+)
+
+_KINDS = {
+    Null: "NULL",
+    Diffuse: "DIFFUSE",
+    Dielectric: "DIELECTRIC",
+    RoughDielectric: "ROUGH_DIELECTRIC",
+    Conductor: "CONDUCTOR",
+    RoughConductor: "ROUGH_CONDUCTOR",
+    Plastic: "PLASTIC",
+    RoughPlastic: "ROUGH_PLASTIC",
+}
+_TRANSMISSIVE = ("NULL", "DIELECTRIC", "THIN_DIELECTRIC", "ROUGH_DIELECTRIC")
+_SMOOTH = ("NULL", "DIELECTRIC", "THIN_DIELECTRIC", "CONDUCTOR")
+_COLORS = ("reflectance", "diffuse_reflectance", "specular_reflectance", "specular_transmittance")
+
+
+@dataclass(frozen=True)
+class Side:
+    """A surface as seen from one side: a BSDF that is no wrapper, behind masks of these opacities.
+
+    `black`: it absorbs whatever the masks do not let pass.  Equal where the BSDF is the same object.
+    """
+
+    bsdf: Bsdf
+    opacities: tuple[Texture, ...] = ()
+    black: bool = False
+
+
+def side_kind(bsdf: Bsdf) -> str:
+    """Name in `layout.BSDFS` of a BSDF that is no wrapper."""
+    return "THIN_DIELECTRIC" if isinstance(bsdf, Dielectric) and bsdf.thin else _KINDS[type(bsdf)]
+
+
+def bsdf_sides(bsdf: Bsdf) -> tuple[Side | None, Side | None]:
+    """Front and back of a surface; None: black.  What light passes has the same on both.
+
+    Raises
+    ------
+    ValueError
+        A two-sided BSDF round one that light passes, or two masks with textures round one BSDF.
+    """
+    if isinstance(bsdf, TwoSided):
+        front, back = bsdf_sides(bsdf.front)[0], bsdf_sides(bsdf.back)[0]
+        for side in (front, back):
+            if side is None or side.opacities or side_kind(side.bsdf) in _TRANSMISSIVE:
+                raise ValueError("a two-sided BSDF takes no BSDF that light passes")
+        return front, back
+    if isinstance(bsdf, Mask):
+        return _masked(bsdf)
+    side = Side(bsdf)
+    return side, side if side_kind(bsdf) in _TRANSMISSIVE else None
+
+
+def _masked(mask: Mask) -> tuple[Side | None, Side | None]:
+    front, back = bsdf_sides(mask.nested)
+    if isinstance(front.bsdf, Null) or mask.opacity in ((1.0,), (1.0, 1.0, 1.0)):
+        return front, back
+    if sum(isinstance(o, Bitmap | Checkerboard) for o in (mask.opacity, *front.opacities)) > 1:
+        raise ValueError("only one of the masks round a BSDF may have a texture")
+    back = Side(front.bsdf, front.opacities, black=True) if back is None else back
+    return tuple(replace(side, opacities=(*side.opacities, mask.opacity)) for side in (front, back))
+
+
+def _parts(bsdf: Bsdf) -> list[Side]:
+    return [side for side in dict.fromkeys(bsdf_sides(bsdf)) if side is not None]
+
+
+def _colors(side: Side) -> list[Texture]:
+    return [getattr(side.bsdf, name) for name in _COLORS if hasattr(side.bsdf, name)]
+
+
+def _color_is_grey(color: Texture) -> bool:
+    if isinstance(color, Bitmap):
+        return bool((color.pixels == color.pixels[..., :1]).all())
+    if isinstance(color, Checkerboard):
+        return _color_is_grey(color.color0) and _color_is_grey(color.color1)
+    return len(set(color)) == 1
+
+
+def bsdf_kinds(bsdf: Bsdf) -> set[str]:
+    """Names in `layout.BSDFS` of what is on either side."""
+    return {side_kind(side.bsdf) for side in _parts(bsdf)}
+
+
+def is_grey(bsdf: Bsdf) -> bool:
+    """Whether it treats all channels alike; opacities always do."""
+    colors = [color for side in _parts(bsdf) for color in _colors(side)]
+    metals = [s.bsdf for s in _parts(bsdf) if isinstance(s.bsdf, Conductor | RoughConductor)]
+    return all(_color_is_grey(color) for color in colors) and all(
+        len(set(value)) == 1 for metal in metals for value in (metal.eta, metal.k)
+    )
+
+
+def passes_light(bsdf: Bsdf) -> bool:
+    """Whether light may go straight on: null, a mask, a thin dielectric.  Shadow rays look at those."""
+    return any(side.opacities or side_kind(side.bsdf) in ("NULL", "THIN_DIELECTRIC") for side in _parts(bsdf))
+
+
+def is_transmissive(bsdf: Bsdf) -> bool:
+    """Whether light may be refracted to the other side: a dielectric, smooth or rough, that is not thin."""
+    return bool(bsdf_kinds(bsdf) & {"DIELECTRIC", "ROUGH_DIELECTRIC"})
+
+
+def reflects(bsdf: Bsdf) -> bool:
+    """Whether there is a surface at all, that is anything but null."""
+    return bsdf_kinds(bsdf) != {"NULL"}
+
+
+def samples_lights(bsdf: Bsdf) -> bool:
+    """Whether it has more than delta lobes, so that light can be sampled for it."""
+    return not bsdf_kinds(bsdf) <= set(_SMOOTH)
+
+
+def bsdf_textures(bsdf: Bsdf) -> list[Bitmap | Checkerboard]:
+    """Its textures, opacities included, in no particular order."""
+    found = [t for side in _parts(bsdf) for t in (*_colors(side), *side.opacities)]
+    return [t for t in found if isinstance(t, Bitmap | Checkerboard)]
+
+
+def has_textures(bsdf: Bsdf) -> bool:
+    """Whether any colour or opacity varies over the surface."""
+    return bool(bsdf_textures(bsdf))
+
+
+def has_bitmaps(bsdf: Bsdf) -> bool:
+    """Whether any of its textures has texels."""
+    return any(isinstance(t, Bitmap) for t in bsdf_textures(bsdf))
+
+
+def has_tables(bsdf: Bsdf) -> bool:
+    """Whether it needs `material_tables`."""
+    return "ROUGH_PLASTIC" in bsdf_kinds(bsdf)

@@ -1,0 +1,182 @@
+"""BSDFs: the materials of surfaces."""
+
+from __future__ import annotations
+
+from clvol.scene.materials import (
+    Bitmap,
+    Bsdf,
+    Checkerboard,
+    Conductor,
+    Dielectric,
+    Diffuse,
+    Mask,
+    Null,
+    Plastic,
+    RoughConductor,
+    RoughDielectric,
+    RoughPlastic,
+    Spectrum,
+    TwoSided,
+)
+from clvol.scene.reader import Reader
+from clvol.scene.refraction import INDICES, METALS
+from clvol.scene.texture import constant, texture
+from clvol.scene.vocabulary import did_you_mean, join_hints, listed
+
+TRANSMISSIVE = (Null, Dielectric, RoughDielectric)
+DISTRIBUTIONS = ("beckmann", "ggx")
+
+
+def null(reader: Reader) -> Null:
+    """The `null` BSDF: light passes the surface unchanged."""
+    return Null()
+
+
+def diffuse(reader: Reader) -> Diffuse:
+    """The `diffuse` plugin: Lambertian on the front, black on the back."""
+    return Diffuse(texture(reader, "reflectance", 0.5))
+
+
+def dielectric(reader: Reader) -> Dielectric:
+    """The `dielectric` plugin: a smooth boundary."""
+    return Dielectric(*_indices(reader, "bk7"), *_specular(reader))
+
+
+def thindielectric(reader: Reader) -> Dielectric:
+    """The `thindielectric` plugin: a pane, both of its boundaries in one."""
+    return Dielectric(*_indices(reader, "bk7"), *_specular(reader), thin=True)
+
+
+def roughdielectric(reader: Reader) -> RoughDielectric:
+    """The `roughdielectric` plugin."""
+    indices = _indices(reader, "bk7", differ=True)
+    return RoughDielectric(*indices, *_microfacets(reader), *_specular(reader))
+
+
+def conductor(reader: Reader) -> Conductor:
+    """The `conductor` plugin: a smooth metal of a `material` or of eta and k; else a perfect mirror."""
+    return Conductor(*_metal(reader), texture(reader, "specular_reflectance", 1.0))
+
+
+def roughconductor(reader: Reader) -> RoughConductor:
+    """The `roughconductor` plugin."""
+    metal = _metal(reader)
+    return RoughConductor(*metal, *_microfacets(reader), texture(reader, "specular_reflectance", 1.0))
+
+
+def plastic(reader: Reader) -> Plastic:
+    """The `plastic` plugin: a diffuse base under a smooth coat."""
+    base = texture(reader, "diffuse_reflectance", 0.5)
+    indices = _indices(reader, "polypropylene")
+    nonlinear = reader.boolean("nonlinear", False)
+    return Plastic(base, *indices, nonlinear, texture(reader, "specular_reflectance", 1.0))
+
+
+def roughplastic(reader: Reader) -> RoughPlastic:
+    """The `roughplastic` plugin: a diffuse base under a rough coat."""
+    reader.ignore("sample_visible")
+    base = texture(reader, "diffuse_reflectance", 0.5)
+    indices = _indices(reader, "polypropylene", differ=True)
+    nonlinear = reader.boolean("nonlinear", False)
+    distribution = reader.string("distribution", "beckmann", DISTRIBUTIONS)
+    alpha = constant(reader, "alpha", 0.1, minimum=0.0)
+    specular = texture(reader, "specular_reflectance", 1.0)
+    return RoughPlastic(base, *indices, nonlinear, distribution, alpha, specular)
+
+
+def twosided(reader: Reader) -> TwoSided:
+    """The `twosided` plugin: one BSDF for both sides, or the front's and the back's in the order given."""
+    found = _nested(reader, most=2)
+    for name, bsdf in found:
+        if isinstance(bsdf, (*TRANSMISSIVE, Mask)):
+            reader.fail(
+                "a twosided BSDF takes no BSDF that light passes",
+                name,
+                "put the twosided one into the mask" if isinstance(bsdf, Mask) else "it has two sides itself",
+            )
+    return TwoSided(found[0][1], found[-1][1])
+
+
+def mask(reader: Reader) -> Mask:
+    """The `mask` plugin: `opacity` 1 shows the nested BSDF, 0 lets light pass."""
+    opacity = texture(reader, "opacity", 0.5)
+    nested = _nested(reader, most=1)[0][1]
+    if isinstance(opacity, Bitmap | Checkerboard) and _masked_by_texture(nested):
+        reader.fail(
+            "only one of the masks round a BSDF may have a texture as its opacity", "opacity", "multiply them"
+        )
+    return Mask(nested, opacity)
+
+
+def _masked_by_texture(bsdf: Bsdf) -> bool:
+    if not isinstance(bsdf, Mask):
+        return False
+    return isinstance(bsdf.opacity, Bitmap | Checkerboard) or _masked_by_texture(bsdf.nested)
+
+
+def _nested(reader: Reader, most: int) -> list[tuple[str, Bsdf]]:
+    found = reader.children("bsdf")
+    if not found:
+        reader.fail(f"'{reader.type}' has no BSDF in it", hint="nest the one that it is about")
+    if len(found) > most:
+        reader.fail(f"'{reader.type}' takes at most {most} BSDFs, got {len(found)}", found[most][0])
+    return [(name, reader.build.build(node)) for name, node in found]
+
+
+def _specular(reader: Reader) -> tuple:
+    reflectance = texture(reader, "specular_reflectance", 1.0)
+    return reflectance, texture(reader, "specular_transmittance", 1.0)
+
+
+def _index(reader: Reader, name: str, default: str) -> float:
+    """A refractive index: a number > 0, or one of `INDICES` in any case."""
+    if not isinstance(reader.node.get(name, default), str):
+        return reader.number(name, 1.0, minimum=0.0, open_interval=True)
+    given = reader.string(name, default)
+    if given.lower() not in INDICES:
+        hint = join_hints(
+            did_you_mean(given.lower(), INDICES), f"give a number, or one of: {listed(INDICES)}"
+        )
+        reader.fail(f"'{name}' of bsdf '{reader.type}' is an unknown material '{given}'", name, hint)
+    return INDICES[given.lower()]
+
+
+def _indices(reader: Reader, interior: str, differ: bool = False) -> tuple[float, float]:
+    """int_ior and ext_ior; `differ`: rough boundaries of nothing have no density."""
+    inside, outside = _index(reader, "int_ior", interior), _index(reader, "ext_ior", "air")
+    if differ and inside == outside:
+        reader.fail(
+            f"int_ior and ext_ior of a {reader.type} must differ",
+            "int_ior" if reader.has("int_ior") else "ext_ior",
+            "a boundary between equal indices is no surface: use null",
+        )
+    return inside, outside
+
+
+def _metal(reader: Reader) -> tuple[Spectrum, Spectrum]:
+    """eta and k; of a perfect mirror where nothing is given."""
+    name = reader.string("material", "none")
+    given = [key for key in ("eta", "k") if reader.has(key)]
+    if given and reader.has("material"):
+        reader.fail("give either a material or eta and k, not both", given[0])
+    if name != "none":
+        if name not in METALS:
+            hint = join_hints(did_you_mean(name, METALS), f"supported: none, {listed(METALS)}")
+            reader.fail(f"unknown metal '{name}'", "material", hint)
+        return METALS[name]
+    for key in given:
+        if not reader.is_value(key):
+            reader.refuse_plugin(key, "a number, an rgb or a spectrum (no texture here)")
+    return reader.color("eta", 0.0), reader.color("k", 1.0)
+
+
+def _microfacets(reader: Reader) -> tuple[str, float, float]:
+    """Distribution, alpha_u and alpha_v."""
+    reader.ignore("sample_visible")
+    distribution = reader.string("distribution", "beckmann", DISTRIBUTIONS)
+    sides = [name for name in ("alpha_u", "alpha_v") if reader.has(name)]
+    if sides and (len(sides) == 1 or reader.has("alpha")):
+        reader.fail("give either alpha, or both alpha_u and alpha_v", sides[0])
+    alpha = constant(reader, "alpha", 0.1, minimum=0.0)
+    u, v = (constant(reader, name, alpha, minimum=0.0) for name in ("alpha_u", "alpha_v"))
+    return distribution, u, v

@@ -1,0 +1,168 @@
+"""What surfaces are made of: textures and BSDFs as plain frozen records.
+
+As in `records`, nothing here knows Mitsuba's syntax or OpenCL.  A shape's BSDF is a `Bsdf`; wrappers (`Mask`,
+`TwoSided`) hold others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+Spectrum = tuple[float, ...]
+
+BSDFS = (
+    "NULL",
+    "DIFFUSE",
+    "DIELECTRIC",
+    "THIN_DIELECTRIC",
+    "ROUGH_DIELECTRIC",
+    "CONDUCTOR",
+    "ROUGH_CONDUCTOR",
+    "PLASTIC",
+    "ROUGH_PLASTIC",
+)
+"""Kinds of material on the device; wrappers have none of their own."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bitmap:
+    """A picture over (u, v).  `pixels`: float32 (height, width, 3), linear, the row at v = 0 first.
+
+    `to_uv` (3x3, float64) maps the surface's (u, v, 1) to the picture's.  Values beyond the unit square
+    repeat, mirror or take the border's ("repeat" | "mirror" | "clamp").
+    """
+
+    pixels: np.ndarray
+    to_uv: np.ndarray = field(default_factory=lambda: np.eye(3))
+    filter_type: str = "bilinear"  # "bilinear" | "nearest"
+    wrap_mode: str = "repeat"
+    source: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Checkerboard:
+    """Two colours by turns, four squares to the unit square of (u, v) under `to_uv` (3x3)."""
+
+    color0: Spectrum = (0.4,)
+    color1: Spectrum = (0.2,)
+    to_uv: np.ndarray = field(default_factory=lambda: np.eye(3))
+
+
+Texture = Spectrum | Bitmap | Checkerboard
+"""A colour everywhere the same, or one over (u, v)."""
+
+
+@dataclass(frozen=True)
+class Null:
+    """No surface at all: light passes straight on."""
+
+
+@dataclass(frozen=True, eq=False)
+class Diffuse:
+    """Lambertian reflection, on the front only."""
+
+    reflectance: Texture = (0.5,)
+
+
+@dataclass(frozen=True, eq=False)
+class Dielectric:
+    """Smooth boundary between refractive indices `int_ior` (behind the normal) and `ext_ior`.
+
+    `thin`: a pane with both its faces, which reflects back and forth between them and does not bend light.
+    """
+
+    int_ior: float = 1.5046
+    ext_ior: float = 1.000277
+    specular_reflectance: Texture = (1.0,)
+    specular_transmittance: Texture = (1.0,)
+    thin: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class RoughDielectric:
+    """Boundary of microfacets; `distribution` "beckmann" or "ggx", roughness along the two tangents."""
+
+    int_ior: float = 1.5046
+    ext_ior: float = 1.000277
+    distribution: str = "beckmann"
+    alpha_u: float = 0.1
+    alpha_v: float = 0.1
+    specular_reflectance: Texture = (1.0,)
+    specular_transmittance: Texture = (1.0,)
+
+
+@dataclass(frozen=True, eq=False)
+class Conductor:
+    """Smooth metal of complex index eta - i k, each a Spectrum; eta 0 with k 1 reflects everything."""
+
+    eta: Spectrum = (0.0,)
+    k: Spectrum = (1.0,)
+    specular_reflectance: Texture = (1.0,)
+
+
+@dataclass(frozen=True, eq=False)
+class RoughConductor:
+    """Metal of microfacets."""
+
+    eta: Spectrum = (0.0,)
+    k: Spectrum = (1.0,)
+    distribution: str = "beckmann"
+    alpha_u: float = 0.1
+    alpha_v: float = 0.1
+    specular_reflectance: Texture = (1.0,)
+
+
+@dataclass(frozen=True, eq=False)
+class Plastic:
+    """A diffuse base under a smooth dielectric coat; `nonlinear`: colour shifts by inner reflections."""
+
+    diffuse_reflectance: Texture = (0.5,)
+    int_ior: float = 1.49
+    ext_ior: float = 1.000277
+    nonlinear: bool = False
+    specular_reflectance: Texture = (1.0,)
+
+
+@dataclass(frozen=True, eq=False)
+class RoughPlastic:
+    """A diffuse base under a coat of microfacets (one `alpha`)."""
+
+    diffuse_reflectance: Texture = (0.5,)
+    int_ior: float = 1.49
+    ext_ior: float = 1.000277
+    nonlinear: bool = False
+    distribution: str = "beckmann"
+    alpha: float = 0.1
+    specular_reflectance: Texture = (1.0,)
+
+
+@dataclass(frozen=True, eq=False)
+class TwoSided:
+    """`front` seen along the normal's side, `back` from the other."""
+
+    front: Bsdf
+    back: Bsdf
+
+
+@dataclass(frozen=True, eq=False)
+class Mask:
+    """`nested` where `opacity` is 1, nothing where it is 0, by chance in between."""
+
+    nested: Bsdf
+    opacity: Texture = (0.5,)
+
+
+Bsdf = (
+    Null
+    | Diffuse
+    | Dielectric
+    | RoughDielectric
+    | Conductor
+    | RoughConductor
+    | Plastic
+    | RoughPlastic
+    | TwoSided
+    | Mask
+)

@@ -1,0 +1,204 @@
+"""Triangle meshes: what a file's triangles must be to be rendered, their smooth normals, and their flaws."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from clvol.scene.records import Mesh
+
+log = logging.getLogger("clvol")
+
+MAX_INDICES = 2**31 - 1
+FAR = 8.0
+"""A mesh this many times its size away from its origin gets an origin of its own: floats are coarse there."""
+_CHUNK = 2**17
+"""Triangles worked on at a time: what is worked out for each corner needs several times a mesh's memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class RawMesh:
+    """A file's triangles: vertices (n, 3), integer faces (m, 3), normals (n, 3) and uvs (n, 2) or None."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    normals: np.ndarray | None = None
+    uvs: np.ndarray | None = None
+
+
+def triangle_fans(vertices: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Triangles (0, k, k + 1) of polygons whose corners, as many as `sizes` says, lie in a row; (n, 3)."""
+    triangles = sizes - 2
+    start = np.repeat(np.cumsum(sizes) - sizes, triangles)
+    within = np.arange(len(start)) - np.repeat(np.cumsum(triangles) - triangles, triangles)
+    return np.stack([vertices[start], vertices[start + within + 1], vertices[start + within + 2]], axis=1)
+
+
+def build_mesh(raw: RawMesh, source: str, smooth: bool) -> tuple[Mesh, np.ndarray]:
+    """The mesh of a file, and the point (float64 (3,)) that its vertices are relative to.
+
+    Triangles without an area are dropped, and counted in the log.  `smooth`: the file's normals, or else, as
+    in Mitsuba, means of the faces round each vertex, weighted by their angles there; if not, there are none.
+
+    Raises
+    ------
+    ValueError
+        No triangles, indices that point nowhere, or values that are not finite as floats.
+    """
+    vertices, faces = np.asarray(raw.vertices), np.asarray(raw.faces)
+    if faces.ndim != 2 or faces.shape[1] != 3 or not len(faces):
+        raise ValueError("it has no triangles")
+    if 3 * len(faces) > MAX_INDICES or len(vertices) > MAX_INDICES:
+        raise ValueError(f"it has {len(faces)} triangles, at most {MAX_INDICES // 3} can be indexed")
+    low, high = int(faces.min()), int(faces.max())
+    if low < 0 or high >= len(vertices):
+        raise ValueError(f"a triangle names vertex {low if low < 0 else high} of {len(vertices)}")
+    origin = _origin(vertices)
+    with np.errstate(over="ignore"):
+        local = np.ascontiguousarray(vertices - origin, dtype=np.float32)
+    _check_finite(local, "vertex")
+    faces = _with_area(local, np.ascontiguousarray(faces, dtype=np.int32), source)
+    uvs = None if raw.uvs is None else np.ascontiguousarray(raw.uvs, dtype=np.float32)
+    if uvs is not None:
+        _check_finite(uvs, "texture coordinate")
+    normals = _normals(local, faces, raw.normals) if smooth else None
+    return Mesh(local, faces, normals, uvs, source), origin
+
+
+def _check_finite(values: np.ndarray, what: str) -> None:
+    broken = ~np.isfinite(values).all(axis=1)
+    if broken.any():
+        raise ValueError(f"{what} {int(broken.argmax())} is not finite")
+
+
+def _origin(vertices: np.ndarray) -> np.ndarray:
+    """The middle of a mesh that lies far from (0, 0, 0), else (0, 0, 0)."""
+    lower, upper = vertices.min(axis=0).astype(np.float64), vertices.max(axis=0).astype(np.float64)
+    with np.errstate(over="ignore", invalid="ignore"):
+        middle, size = lower / 2 + upper / 2, np.linalg.norm(upper - lower)
+        return middle if np.linalg.norm(middle) > FAR * size else np.zeros(3)
+
+
+def _chunks(count: int) -> Iterator[slice]:
+    return (slice(first, first + _CHUNK) for first in range(0, count, _CHUNK))
+
+
+def _cross(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Normals with the length of twice the area, float64 (m, 3); 0 exactly where there is no area, since the
+    products of differences of floats are exact in double."""
+    a, b, c = (vertices[faces[:, n]].astype(np.float64) for n in range(3))
+    return np.cross(b - a, c - a)
+
+
+def _with_area(vertices: np.ndarray, faces: np.ndarray, source: str) -> np.ndarray:
+    kept = np.concatenate([_cross(vertices, faces[part]).any(axis=1) for part in _chunks(len(faces))])
+    if kept.all():
+        return faces
+    if not kept.any():
+        raise ValueError("none of its triangles has an area")
+    log.warning("%s: %d of %d triangles have no area and are left out", source, (~kept).sum(), len(faces))
+    return faces[kept]
+
+
+def _normals(vertices: np.ndarray, faces: np.ndarray, given: np.ndarray | None) -> np.ndarray:
+    """Unit normals of the vertices, float32 (n, 3): those given, else computed (also where they are 0)."""
+    if given is not None:
+        _check_finite(given, "normal")
+        length = np.linalg.norm(given, axis=1)
+        if (length[faces.reshape(-1)] > 0).all():
+            return (given / np.where(length > 0, length, 1)[:, None]).astype(np.float32)
+    normals = smooth_normals(vertices, faces)
+    if given is not None:
+        known = length > 0
+        normals[known] = given[known] / length[known, None]
+    return normals
+
+
+def smooth_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Normals of vertices from the faces round them, weighted by the angles there (Thürmer, Wüthrich 1998).
+
+    Vertices of no face get (0, 0, 1), those whose faces cancel out one face's normal.  float32 (n, 3).
+    """
+    count = len(vertices)
+    sums = np.zeros((count, 3))
+    for part in _chunks(len(faces)):
+        corners = faces[part]
+        flat = _unit(_cross(vertices, corners))
+        for n in range(3):
+            here, after, before = (vertices[corners[:, (n + k) % 3]].astype(np.float64) for k in range(3))
+            u, v = _unit(after - here), _unit(before - here)
+            # 2 asin(|u − v| / 2) keeps its digits at small angles, where acos(u·v) does not (Kahan)
+            opposed = (u * v).sum(axis=1) < 0
+            chord = np.linalg.norm(np.where(opposed[:, None], u + v, u - v), axis=1)
+            angle = 2 * np.arcsin(np.minimum(chord / 2, 1))
+            angle = np.where(opposed, np.pi - angle, angle)
+            np.add.at(sums, corners[:, n], angle[:, None] * flat)
+    length = np.linalg.norm(sums, axis=1)
+    lost = length < 1e-9
+    if lost.any():
+        sums[lost] = (0, 0, 1)
+        for part in _chunks(len(faces)):
+            flat = _unit(_cross(vertices, faces[part]))
+            for n in range(3):
+                at = lost[faces[part][:, n]]
+                sums[faces[part][at, n]] = flat[at]
+        length[lost] = 1
+    sums /= length[:, None]
+    return sums.astype(np.float32)
+
+
+def _unit(v: np.ndarray) -> np.ndarray:
+    return v / np.linalg.norm(v, axis=1, keepdims=True)
+
+
+def mesh_flaws(mesh: Mesh) -> list[str]:
+    """What keeps a mesh from bounding a volume, in words; empty for a closed one that faces outwards.
+
+    Positions count as one where they are equal exactly: texture seams and hard edges split vertices only.
+    """
+    corners = _merged(mesh.vertices)[mesh.faces]
+    start, end = corners.reshape(-1), np.roll(corners, -1, axis=1).reshape(-1)
+    proper = start != end
+    start, end = start[proper], end[proper]
+    key = np.minimum(start, end) * len(mesh.vertices) + np.maximum(start, end)
+    edges, edge = np.unique(key, return_inverse=True)
+    forward = np.bincount(edge.reshape(-1), start < end, len(edges))
+    total = np.bincount(edge.reshape(-1), minlength=len(edges))
+    open_edges = int((total % 2 == 1).sum())
+    against = int(((total % 2 == 0) & (2 * forward != total)).sum())
+    flaws = []
+    if open_edges:
+        flaws.append(f"{open_edges} open edge{'s' if open_edges > 1 else ''}")
+    if against:
+        flaws.append(f"{against} edge{'s' if against > 1 else ''} whose triangles face opposite sides")
+    if not flaws:
+        volume = _volume(mesh)
+        if volume < 0:
+            flaws.append(f"triangles that face inwards (volume {volume:.4g})")
+        elif volume == 0:
+            flaws.append("no volume inside")
+    return flaws
+
+
+def _merged(vertices: np.ndarray) -> np.ndarray:
+    """A number for each vertex, the same for the same position; int64 (n,)."""
+    positive_zeros = np.asarray(vertices, np.float32) + np.float32(0)
+    bits = positive_zeros.view(np.uint32).astype(np.uint64)
+    number = bits[:, 0]
+    for axis in (1, 2):
+        packed = number << np.uint64(32) | bits[:, axis]
+        number = np.unique(packed, return_inverse=True)[1].reshape(-1).astype(np.uint64)
+    return number.astype(np.int64)
+
+
+def _volume(mesh: Mesh) -> float:
+    """Signed volume, by the divergence theorem, about the middle of the mesh."""
+    middle = mesh.vertices.mean(axis=0, dtype=np.float64)
+    total = 0.0
+    for part in _chunks(len(mesh.faces)):
+        a, b, c = (mesh.vertices[mesh.faces[part, n]].astype(np.float64) - middle for n in range(3))
+        total += float((a * np.cross(b, c)).sum()) / 6
+    return total

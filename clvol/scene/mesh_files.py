@@ -1,0 +1,105 @@
+"""Meshes from files: STL, glTF and most PLY through trimesh, the rest by `obj` and `ply`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from clvol.scene.mesh import RawMesh, build_mesh
+from clvol.scene.obj import read_obj
+from clvol.scene.ply import read_mixed_ply
+from clvol.scene.records import Mesh
+
+FORMATS = ("obj", "ply", "stl", "glb", "gltf")
+_HINTS = {  # what trimesh says, and what it may mean
+    "No module named": "it is damaged, or needs that package",
+    "No such file": "a gltf needs the files that it names beside it: try glb",
+}
+
+
+def read_mesh(
+    path: Path, kind: str, flip_tex_coords: bool = False, face_normals: bool = False
+) -> tuple[Mesh, np.ndarray]:
+    """The triangles of a file of one of `FORMATS`, and the point (float64 (3,)) they are relative to.
+
+    Parts of a glTF scene are put together under their transforms.  An STL always has face normals: it does
+    not say which triangles meet.  `flip_tex_coords`: v becomes 1 − v.
+
+    Raises
+    ------
+    ValueError
+        Not a mesh of this format, or one that cannot be rendered; what is wrong and perhaps what to do.
+    """
+    try:
+        raw = _read(path, kind)
+    except Exception as error:  # trimesh raises whatever its parsers stumble over
+        reason = " ".join(str(error).split())[:160] or type(error).__name__
+        hint = next((f" ({meaning})" for said, meaning in _HINTS.items() if said in reason), "")
+        raise ValueError(f"it cannot be read as {kind}: {reason}{hint}") from None
+    if flip_tex_coords and raw.uvs is not None:
+        raw.uvs[:, 1] = 1 - raw.uvs[:, 1]
+    return build_mesh(raw, str(path), smooth=not face_normals and kind != "stl")
+
+
+def _read(path: Path, kind: str) -> RawMesh:
+    if kind == "obj":
+        return read_obj(path.read_bytes())
+    try:
+        return _read_with_trimesh(path, kind)
+    except ValueError as error:
+        if "PLY is unexpected length" not in str(error):
+            raise
+        return read_mixed_ply(path.read_bytes())
+
+
+def _read_with_trimesh(path: Path, kind: str) -> RawMesh:
+    import trimesh  # takes half a second, which scenes without meshes are spared
+
+    with np.errstate(all="ignore"):
+        loaded = trimesh.load(str(path), file_type=kind, process=False, maintain_order=True)
+    if isinstance(loaded, trimesh.Trimesh):
+        return _raw(loaded, np.eye(4))
+    parts = []
+    if isinstance(loaded, trimesh.Scene):
+        for node in loaded.graph.nodes_geometry:
+            to_world, name = loaded.graph[node]
+            if isinstance(loaded.geometry[name], trimesh.Trimesh):
+                parts.append(_raw(loaded.geometry[name], np.asarray(to_world, np.float64)))
+    return _joined(parts)
+
+
+def _raw(mesh: object, to_world: np.ndarray) -> RawMesh:
+    """A trimesh under a transform; only the normals that its file holds."""
+    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    normals = np.asarray(mesh.vertex_normals) if "vertex_normals" in mesh._cache else None
+    uvs = getattr(mesh.visual, "uv", None)
+    uvs = None if uvs is None else np.array(uvs, np.float64)
+    if not np.array_equal(to_world, np.eye(4)):
+        vertices = vertices @ to_world[:3, :3].T + to_world[:3, 3]
+        if normals is not None:
+            normals = normals @ np.linalg.inv(to_world[:3, :3])
+        if np.linalg.det(to_world[:3, :3]) < 0:  # mirrored: outside stays outside
+            faces = faces[:, ::-1]
+    return RawMesh(vertices, faces, normals, uvs)
+
+
+def _joined(parts: list[RawMesh]) -> RawMesh:
+    """Several meshes as one.  Normals that a part lacks are 0, so worked out later; so are its uvs."""
+    if not parts:
+        raise ValueError("it has no triangles")
+    if len(parts) == 1:
+        return parts[0]
+    first = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    has_normals = any(part.normals is not None for part in parts)
+    has_uvs = any(part.uvs is not None for part in parts)
+    return RawMesh(
+        np.concatenate([part.vertices for part in parts]),
+        np.concatenate([part.faces + at for part, at in zip(parts, first, strict=False)]),
+        np.concatenate([_or_zeros(p.normals, p, 3) for p in parts]) if has_normals else None,
+        np.concatenate([_or_zeros(p.uvs, p, 2) for p in parts]) if has_uvs else None,
+    )
+
+
+def _or_zeros(values: np.ndarray | None, part: RawMesh, width: int) -> np.ndarray:
+    return np.zeros((len(part.vertices), width)) if values is None else values

@@ -1,0 +1,86 @@
+"""Textures: colours over a surface, and how a BSDF reads a parameter that may be one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clvol.scene.files import find_parameter
+from clvol.scene.image import image_from_array, read_image
+from clvol.scene.materials import Bitmap, Checkerboard, Texture
+from clvol.scene.nodes import Node
+from clvol.scene.reader import Reader
+
+NEGLIGIBLE = 1e-4
+"""How far texels may lie beyond 0..1: rounding of converted pictures, which is cut."""
+
+
+def bitmap(reader: Reader) -> Bitmap:
+    """The `bitmap` plugin: a picture from a file or an array, of values in [0, 1] after decoding."""
+    reader.ignore("accel", "format")
+    if reader.has("filename") == reader.has("bitmap"):
+        reader.fail("a bitmap texture needs either a filename or a bitmap (array)")
+    raw = reader.boolean("raw", False)
+    if reader.has("filename"):
+        place, source = "filename", str(find_parameter(reader, "filename"))
+        pixels = read_image(source, reader.node.place(place), raw)
+    else:
+        place = source = "bitmap"
+        pixels = image_from_array(reader.array(place), reader.node.place(place), raw)
+    broken = ~((pixels >= -NEGLIGIBLE) & (pixels <= 1 + NEGLIGIBLE))
+    if broken.any():
+        row, column = np.argwhere(broken)[0][:2]
+        shown = pixels[row, column].tolist()
+        reader.fail(f"texels must be in [0, 1]; at row {row}, column {column} there is {shown}", place)
+    return Bitmap(
+        np.clip(pixels, 0, 1),
+        _to_uv(reader),
+        reader.string("filter_type", "bilinear", ("bilinear", "nearest")),
+        reader.string("wrap_mode", "repeat", ("repeat", "mirror", "clamp")),
+        source,
+    )
+
+
+def checkerboard(reader: Reader) -> Checkerboard:
+    """The `checkerboard` plugin: `color0` where u and v lie in like halves of their units, else `color1`."""
+    for name in ("color0", "color1"):
+        if not reader.is_value(name):
+            reader.refuse_plugin(name, "a number, an rgb or a spectrum (no texture in a texture)")
+    color0 = reader.color("color0", 0.4, maximum=1.0)
+    return Checkerboard(color0, reader.color("color1", 0.2, maximum=1.0), _to_uv(reader))
+
+
+def texture(reader: Reader, name: str, default: float) -> Texture:
+    """Parameter `name`: a number, rgb or spectrum in [0, 1], or a texture.
+
+    Raises
+    ------
+    SceneError
+        Another plugin, or a value out of range.
+    """
+    if reader.is_value(name):
+        return reader.color(name, default, maximum=1.0)
+    reader.has(name)
+    found = reader.children("texture", name)
+    if not found:
+        reader.refuse_plugin(name, "a number, an rgb, a spectrum or a texture")
+    return reader.build.build(found[0][1])
+
+
+def constant(reader: Reader, name: str, default: float, minimum: float) -> float:
+    """A number >= `minimum` that Mitsuba may take from a texture, and clvol may not."""
+    if isinstance(reader.node.get(name), Node) and not reader.is_value(name):
+        reader.refuse_plugin(name, "a number (no texture here)")
+    return reader.number(name, default, minimum=minimum)
+
+
+def _to_uv(reader: Reader) -> np.ndarray:
+    """The 3x3 part of `to_uv` (3x3, or 4x4 without its z) that moves (u, v)."""
+    given = reader.node.get("to_uv")
+    given = getattr(given, "matrix", given)
+    if np.shape(given) == (3, 3):
+        reader.has("to_uv")
+        matrix = np.asarray(given)
+        if matrix.dtype.kind not in "iuf" or not np.isfinite(matrix).all() or (matrix[2] != (0, 0, 1)).any():
+            reader.fail("to_uv must be finite, with a last row of 0 0 1", "to_uv")
+        return matrix.astype(np.float64)
+    return reader.transform("to_uv")[np.ix_([0, 1, 3], [0, 1, 3])]

@@ -1,0 +1,218 @@
+"""Rays per second on one thread, closest hit, beside Embree (through embreex), and what the hierarchy costs.
+
+    python tools/bench_rays.py          needs `pip install embreex`
+
+Both sides trace the same rays through the same mesh by turns: ours is the kernel's time by the device's
+clock, Embree's the time of the one call that traces them all.  Measuring is left to a process of its own,
+since PoCL reads its number of threads when it starts.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pyopencl as cl
+from bench_costs import peak_bytes
+from bench_tables import Figures, against, ranged, show
+from efficiency import spread
+
+from clvol import programs
+from clvol.accel.bvh import Bvh, build_bvh
+from clvol.device import Device, open_device
+
+SIZES = (70_000, 1_000_000)
+EDGE = 1024
+RATIO_TARGET, BUILD_TARGET, MEMORY_TARGET = 0.5, 15.0, 10.0
+KERNEL = """
+__kernel void trace(__global const float8 *nodes, __global const float8 *triangles, __global const float *o,
+                    __global const float *d, __global uint *primitive)
+{
+    const Scene scene = {nodes, triangles};
+    const size_t i = get_global_id(0);
+    const Ray ray = {vload3(i, o), vload3(i, d)};
+    primitive[i] = closest_hit(&scene, ray, 0.0f, NO_PRIMITIVE, INFINITY).primitive;
+}
+"""
+
+
+def knobbly_sphere(triangles: int) -> tuple[np.ndarray, np.ndarray]:
+    """A closed surface of about so many triangles: six squares on a sphere, with dents of two sizes.
+
+    Returns vertices, float32 (n, 3), and faces, int32 (m, 3).
+    """
+    edge = round((triangles / 12) ** 0.5)
+    a, b = np.meshgrid(*2 * [np.tan(np.linspace(-1, 1, edge + 1) * np.pi / 4)], indexing="ij")
+    number = np.arange((edge + 1) ** 2, dtype=np.int32).reshape(edge + 1, edge + 1)
+    square = np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], axis=-1)
+    square = square.reshape(-1, 4)
+    points, faces = [], []
+    for side in range(6):
+        at = np.stack([np.full(a.shape, 1 - 2 * (side % 2)), a, b], axis=-1).reshape(-1, 3)
+        faces += [square[:, [0, 1, 2]] + side * number.size, square[:, [0, 2, 3]] + side * number.size]
+        points.append(np.roll(at / np.linalg.norm(at, axis=1, keepdims=True), side // 2, axis=1))
+    x, y, z = np.concatenate(points).T
+    radius = 1 + 0.15 * np.sin(7 * x + 1) * np.sin(6 * y) * np.sin(5 * z + 2)
+    radius += 0.03 * np.sin(40 * x) * np.sin(37 * y) * np.sin(43 * z)
+    return (np.stack([x, y, z], axis=1) * radius[:, None]).astype(np.float32), np.concatenate(faces)
+
+
+def incoherent_rays(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """From points in the bounding box, to everywhere: origins and directions, float32 (EDGE², 3)."""
+    generator = np.random.default_rng(1)
+    o = generator.uniform(vertices.min(axis=0), vertices.max(axis=0), (EDGE**2, 3))
+    d = generator.normal(size=o.shape)
+    return o.astype(np.float32), (d / np.linalg.norm(d, axis=1, keepdims=True)).astype(np.float32)
+
+
+def coherent_rays(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A pinhole camera's, row by row; the mesh fills most of the picture."""
+    across = (np.arange(EDGE) + 0.5) / EDGE - 0.5
+    d = np.stack([*np.meshgrid(0.8 * across, 0.8 * across), np.ones((EDGE, EDGE))], axis=-1).reshape(-1, 3)
+    o = np.tile(np.add(vertices.mean(axis=0), [0.1, 0.05, -3.2]), (len(d), 1))
+    return o.astype(np.float32), (d / np.linalg.norm(d, axis=1, keepdims=True)).astype(np.float32)
+
+
+RAYS = {"incoherent": incoherent_rays, "coherent": coherent_rays}
+
+
+class OurSide:
+    """The hierarchy on the device and a kernel over it."""
+
+    def __init__(self, device: Device, bvh: Bvh) -> None:
+        flags = {"CLVOL_SPECTRUM": 1, "CLVOL_EXTINCTION": 1, "CLVOL_ONE_CHANNEL_PER_PATH": 0}
+        flags |= {"CLVOL_HAS_TRIANGLES": 1, "CLVOL_HAS_QUADRICS": 0, "CLVOL_BVH_STACK": bvh.stack}
+        seen: set[str] = set()
+        text = [f"#define {name} {value}" for name, value in flags.items()]
+        text += programs._expand("core/types.h", seen)
+        text.append("typedef struct { __global const float8 *bvh_nodes, *bvh_triangles; } Scene;")
+        text += programs._expand("geometry/bvh.h", seen)
+        self.device = device
+        self.kernel = cl.Kernel(programs.build(device, "\n".join(text) + KERNEL, "rays"), "trace")
+        self.tree = [self.buffer(bvh.nodes), self.buffer(bvh.packets)]
+
+    def buffer(self, array: np.ndarray) -> cl.Buffer:
+        flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
+        return cl.Buffer(self.device.context, flags, hostbuf=array)
+
+    def trace(self, o: np.ndarray, d: np.ndarray) -> tuple[float, np.ndarray]:
+        """Seconds, and the primitives hit, int32 (rays,), -1 for none."""
+        primitive = np.empty(len(o), np.int32)
+        arrays = [self.buffer(a) for a in (o, d, primitive)]
+        event = self.kernel(self.device.queue, (len(o),), (64,), *self.tree, *arrays)
+        cl.enqueue_copy(self.device.queue, primitive, arrays[2], is_blocking=True)
+        return 1e-9 * (event.profile.end - event.profile.start), primitive
+
+
+class EmbreeSide:
+    """Embree's scene, with its defaults."""
+
+    def __init__(self, vertices: np.ndarray, faces: np.ndarray) -> None:
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+
+        self.scene = EmbreeScene()
+        self.mesh = TriangleMesh(self.scene, vertices[faces])
+        self.scene.run(vertices[:1], vertices[:1])  # builds
+
+    def trace(self, o: np.ndarray, d: np.ndarray) -> tuple[float, np.ndarray]:
+        """Seconds, and the primitives hit, int32 (rays,), -1 for none."""
+        started = time.perf_counter()
+        primitive = self.scene.run(o, d, query="INTERSECT")
+        return time.perf_counter() - started, primitive
+
+
+def rates(rounds: int) -> Figures:
+    """Rays per second of both sides, by size and kind of rays, and the share of rays on which they agree."""
+    figures: Figures = {}
+    device = open_device()
+    for size in SIZES:
+        vertices, faces = knobbly_sphere(size)
+        sides = {
+            "clvol": OurSide(device, build_bvh(vertices, faces, np.empty((0, 2, 3), np.float32))),
+            "embree": EmbreeSide(vertices, faces),
+        }
+        for kind, make in RAYS.items():
+            o, d = make(vertices)
+            found = {name: side.trace(o, d)[1] for name, side in sides.items()}  # and warms up
+            measured: dict[str, list[float]] = {name: [] for name in sides}
+            for _ in range(rounds):
+                for name, side in sides.items():
+                    measured[name].append(len(o) / side.trace(o, d)[0])
+            ratios = np.divide(measured["clvol"], measured["embree"])
+            figures[f"{len(faces)} {kind}"] = {name: spread(v) for name, v in measured.items()} | {
+                "ratio": spread(ratios),
+                "agree": float(np.mean(found["clvol"] == found["embree"])),
+            }
+    return figures
+
+
+def build_costs() -> Figures:
+    """Seconds, and peak memory above what the program had, with the mesh, for the largest mesh."""
+    vertices, faces = knobbly_sphere(8)
+    build_bvh(vertices, faces, np.empty((0, 2, 3), np.float32))
+    vertices, faces = knobbly_sphere(SIZES[-1])
+    mesh = vertices.nbytes + faces.nbytes
+    Path("/proc/self/clear_refs").write_text("5")  # the peak is now what there is
+    before = peak_bytes() - mesh
+    started = time.perf_counter()
+    bvh = build_bvh(vertices, faces, np.empty((0, 2, 3), np.float32))
+    seconds = time.perf_counter() - started
+    return {
+        "triangles": len(faces),
+        "seconds": seconds,
+        "mesh": mesh,
+        "peak": peak_bytes() - before,
+        "nodes": len(bvh.nodes),
+        "packets": len(bvh.packets),
+        "depth": bvh.depth,
+        "stack": bvh.stack,
+    }
+
+
+def measure_rays(rounds: int) -> Figures:
+    """Both measurements, each in a process of its own and on one thread.
+
+    Raises subprocess.CalledProcessError, after the process' own message, where embreex is missing.
+    """
+    one_thread = os.environ | {"POCL_MAX_PTHREAD_COUNT": "1"}
+    figures = {}
+    for name in ("build", "rates"):
+        command = [sys.executable, __file__, name, str(rounds)]
+        output = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, env=one_thread).stdout
+        figures[name] = json.loads(output)
+    return figures
+
+
+def show_rays(figures: Figures) -> None:
+    """Rates beside Embree's, then the build."""
+    rows = []
+    for name, rate in figures["rates"].items():
+        size, kind = name.split()
+        millions = [ranged({k: v / 1e6 for k, v in rate[side].items()}) for side in ("clvol", "embree")]
+        target = against(rate["ratio"]["median"], RATIO_TARGET, at_least=True)
+        rows.append((f"{int(size):,} triangles, {kind}", *millions, ranged(rate["ratio"]), target))
+    show("rays: millions a second, closest hit, one thread", ["", "clvol", "Embree", "ratio", "target"], rows)
+    build = figures["build"]
+    times = build["peak"] / build["mesh"]
+    rows = [
+        ("seconds", f"{build['seconds']:.3g}", against(build["seconds"], BUILD_TARGET)),
+        (
+            f"peak memory, as a multiple of the mesh of {build['mesh'] / 2**20:.0f} MiB",
+            f"{times:.2f}",
+            against(times, MEMORY_TARGET),
+        ),
+    ]
+    show(f"rays: the hierarchy of {build['triangles']:,} triangles", ["", "", "target"], rows)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) == 1:
+        show_rays(measure_rays(5))
+    else:
+        print(json.dumps(build_costs() if sys.argv[1] == "build" else rates(int(sys.argv[2]))))
