@@ -27,6 +27,7 @@ class CameraRays:
     lens_start l and the direction, before it is normalised, by -lens_bend l.
     """
 
+    eye: np.ndarray
     position: np.ndarray
     dx: np.ndarray
     dy: np.ndarray
@@ -78,6 +79,16 @@ def camera_rays(sensor: Perspective, film: Film, centre: np.ndarray, radius: flo
     start = depth / unit
     lens_x, lens_y = sensor.aperture_radius * linear[:, 0], sensor.aperture_radius * linear[:, 1]
     return CameraRays(
-        *(eye + start * base, start * dx, start * dy, base, dx, dy, forward, sensor.far_clip * unit - depth),
+        *(
+            eye,
+            eye + start * base,
+            start * dx,
+            start * dy,
+            base,
+            dx,
+            dy,
+            forward,
+            sensor.far_clip * unit - depth,
+        ),
         *(lens_x, lens_y, 1 - start / sensor.focus_distance, 1 / sensor.focus_distance),
     )

@@ -109,6 +109,11 @@ class KernelConfig:
         return self.nee and (f.constant or f.envmap or f.area)
 
     @property
+    def first_hit(self) -> tuple[str, ...]:
+        """Pictures of what camera paths first meet that `aov` asks for."""
+        return tuple(name for name in registry.FIRST_HIT if name in self.aov)
+
+    @property
     def stages(self) -> tuple[str, ...]:
         """Kernels of one wave, in launch order."""
         stages = ["generate", "intersect"]
@@ -183,6 +188,7 @@ class KernelConfig:
             "CLVOL_HAS_LENS": int(f.lens),
             "CLVOL_HAS_MAX_DEPTH": int(f.depth_limited),
             "CLVOL_HIDE_EMITTERS": int(f.hide_emitters),
+            "CLVOL_FIRST_HIT": int(bool(self.first_hit)),
             "CLVOL_NEE": int(self.nee),
             "CLVOL_MIS": int(self.mis),
             "CLVOL_ABSORPTION": tuple(registry.ABSORPTIONS).index(self.absorption),

@@ -161,6 +161,7 @@ RENDER = _record(
     ("filter_radius", "f", 1),
     ("filter_bins", "i", 1),
     ("sample_border", "i", 1),
+    ("camera_eye", "f", 3),
     ("camera_position", "f", 3),  # pixel (0, 0)'s corner on the plane rays start from
     ("camera_dx", "f", 3),  # one pixel to the right, on that plane
     ("camera_dy", "f", 3),
@@ -295,6 +296,7 @@ def path_fields(config: KernelConfig) -> list[PathField]:
             PathField(f"shadow_{c}", "f", "unattenuated light of next-event estimation", config.nee)
             for c in spectrum
         ),
+        *(PathField(name, "f", "what a picture of the first hit shows") for name in first_hit_fields(config)),
         PathField("cut", "u", "statistics of the slot: paths ended by max_depth", features.depth_limited),
         PathField("cut_energy", "f", "statistics of the slot: weight of those paths", features.depth_limited),
         PathField("largest_weight", "f", "largest weight of the path or the slot", features.media > 0),
@@ -323,6 +325,15 @@ def path_counts(config: KernelConfig) -> tuple[str, ...]:
     shown = {"lookups", *config.aov} | ({"tentative", "real"} if "null" in config.aov else set())
     kept = {field.name for field in path_fields(config)}
     return tuple(name for name in registry.COUNTS if name in shown and name in kept)
+
+
+def first_hit_fields(config: KernelConfig) -> list[str]:
+    """Numbers kept per path for pictures of the first hit, in order; a position comes with whether there is one."""
+    fields = []
+    for name in config.first_hit:
+        fields += [f"{name}_{c}" for c in range(registry.FIRST_HIT[name][1])]
+        fields += ["met"] if name == "position" else []
+    return fields
 
 
 def shows_weight(config: KernelConfig) -> bool:
@@ -361,6 +372,7 @@ def arguments(config: KernelConfig) -> list[Argument]:
         Argument("control", "__global uint *"),
         Argument("results", "__global float *"),
         Argument("result_counts", "__global uint *"),
+        Argument("result_firsts", "__global float *", bool(config.first_hit)),
         Argument("media", "__global const Medium *", features.media > 0),
         Argument("boundary_masks", "__global const uint *", features.boundaries > 0),
         Argument("volumes", "__global const Volume *", features.volumes > 0),
@@ -431,8 +443,32 @@ def layout_text(config: KernelConfig) -> str:
             f"INLINE void set_path_{field.name}({slot}, {c_type} value) {{ {at} = {put}; }}",
         ]
     parts += _counts_text(config)
-    parts += _inside_text(config)
+    parts += _inside_text(config) + _first_hit_text(config)
     return "\n".join(parts) + "\n"
+
+
+def _first_hit_text(config: KernelConfig) -> list[str]:
+    """How what a path first meets is begun, recorded and written."""
+    fields = first_hit_fields(config)
+    values = {"depth_0": "depth", "met": "met"} | {
+        f"{name}_{c}": f"{name}.{axis}"
+        for name in ("normal", "albedo", "position")
+        for c, axis in enumerate("xyz")
+    }
+    reset = " ".join(f"set_path_{name}(scene, slot, 0.0f);" for name in fields)
+    record = " ".join(f"set_path_{name}(scene, slot, {values[name]});" for name in fields)
+    write = " ".join(
+        f"scene->result_firsts[place * {len(fields)}u + {n}u] = path_{name}(scene, slot);"
+        for n, name in enumerate(fields)
+    )
+    slot, place = "const Scene *scene, uint slot", "size_t place"
+    values = "float depth, float3 normal, float3 albedo, float3 position, float met"
+    return [
+        f"#define CLVOL_FIRST_HIT_FIELDS {len(fields)}u",
+        f"INLINE void reset_first_hit({slot}) {{ {reset} }}",
+        f"INLINE void record_first_hit({slot}, {values}) {{ {record} }}",
+        f"INLINE void write_first_hit({slot}, {place}) {{ {write} }}",
+    ]
 
 
 def _inside_text(config: KernelConfig) -> list[str]:

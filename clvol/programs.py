@@ -56,7 +56,7 @@ def stage_headers(config: KernelConfig, stage: str) -> list[str]:
     emits = (stage == "medium_sample" and features.emission and not features.media_overlap) or (
         stage == "shade" and features.emission and features.media_overlap
     )
-    scatters = stage == "shade" and features.scattering
+    scatters = stage == "shade" and (features.scattering or (bool(config.first_hit) and features.media > 0))
     fields = (emits and (features.albedo_volumes or features.emission_volumes or features.temperature)) or (
         scatters and features.albedo_volumes
     )

@@ -162,7 +162,18 @@ COUNTS = {
     "violations": "look-ups above their majorant",
 }
 """What walks count, per path."""
-AOVS = COUNTS | {"null": "null collisions", "largest_weight": "largest absolute path weight"}
+FIRST_HIT = {
+    "depth": ("distance from the camera to the first scattering, at a surface or in a medium", 1),
+    "normal": ("shading normal there, 0 in media", 3),
+    "albedo": ("reflectance or single-scattering albedo there", 3),
+    "position": ("that point in the world", 3),
+}
+"""What camera paths first meet, and its channels; 0 for a path that meets nothing."""
+AOVS = (
+    COUNTS
+    | {"null": "null collisions", "largest_weight": "largest absolute path weight"}
+    | {name: summary for name, (summary, _) in FIRST_HIT.items()}
+)
 
 
 def check_choice(family: str, value: str) -> str:

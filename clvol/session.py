@@ -172,7 +172,9 @@ class Session:
             "version": __version__,
             "seconds": round(self.seconds, 4),
         }
-        aovs = {name: values.reshape(shape) for name, values in self._pictures(count).items()}
+        aovs = {
+            name: values.reshape(*shape, *values.shape[1:]) for name, values in self._pictures(count).items()
+        }
         return Result.from_sums(*sums, (first, count), aovs, stats, metadata)
 
     def _pictures(self, count: int) -> dict[str, np.ndarray]:
@@ -182,7 +184,9 @@ class Session:
         peaks = self.wavefront.peaks_by_pixel()
         found = {}
         for name in dict.fromkeys(("lookups", *self.config.aov)):
-            if name == "largest_weight":
+            if name in registry.FIRST_HIT:
+                values = self._first_hit(name, count * self.config.jobs_per_sample)
+            elif name == "largest_weight":
                 values = peaks.get(name, np.ones(pixels))
             elif name == "null":
                 values = counts["tentative"] - counts["real"] if "tentative" in counts else np.zeros(pixels)
@@ -190,6 +194,15 @@ class Session:
                 values = counts.get(name, np.zeros(pixels))
             found[name] = values.astype(np.float32)
         return found
+
+    def _first_hit(self, name: str, paths: int) -> np.ndarray:
+        """A picture of what camera paths first met: means over `paths` paths, float64 (pixels[, 3])."""
+        sums = self.wavefront.first_hits()
+        channels = registry.FIRST_HIT[name][1]
+        means = np.stack([sums[f"{name}_{c}"] / paths for c in range(channels)], axis=1)
+        if name == "position":  # the device's are relative to the centre
+            means += sums["met"][:, None] / paths * self.prepared.centre
+        return means if channels > 1 else means[:, 0]
 
     def _statistics(self, count: int, setup_seconds: float) -> dict:
         wavefront = self.wavefront
@@ -274,6 +287,7 @@ def render_record(prepared: PreparedScene, seed: int) -> np.ndarray:
     record["sample_border"] = int(scene.film.sample_border)
     rays = camera_rays(scene.sensor, scene.film, prepared.centre, prepared.radius)
     for field, value in {
+        "camera_eye": rays.eye,
         "camera_position": rays.position,
         "camera_dx": rays.dx,
         "camera_dy": rays.dy,

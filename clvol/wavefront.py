@@ -84,6 +84,7 @@ class Wavefront:
         self.groups = pool.slots // config.group_slots
         self.fields = layout.path_fields(config)
         self.path_counts = layout.path_counts(config)
+        self.firsts = layout.first_hit_fields(config)
         self.peaks = 1 + layout.shows_weight(config)
         self.slot_totals = dict.fromkeys(layout.slot_fields(config), 0.0)
         self._harvested = time.perf_counter()
@@ -101,6 +102,7 @@ class Wavefront:
             "counts": 4 * layout.COUNTER_STRIDE * self.groups,
             "control": 4 * (_DONE + self.pool.ring_passes),
             "results": 4 * self.config.channels * ring_jobs // self.config.jobs_per_sample,
+            **({"result_firsts": 4 * len(self.firsts) * ring_jobs} if self.firsts else {}),
             "result_counts": 4 * (len(self.path_counts) + self.peaks - 1) * ring_jobs,
         }
         self.buffers = {name: self._buffer(size) for name, size in sizes.items()} | scene_buffers
@@ -110,6 +112,8 @@ class Wavefront:
             "film_counts": 8 * len(self.path_counts) * self.pixels,
             "film_peaks": 4 * self.peaks * self.pixels,
         }
+        if self.firsts:
+            film_sizes["film_firsts"] = 8 * len(self.firsts) * self.pixels
         self.film = {name: self._buffer(size) for name, size in film_sizes.items()}
         for name, size in film_sizes.items():
             cl.enqueue_fill_buffer(self.device.queue, self.film[name], np.uint32(0), 0, size)
@@ -246,7 +250,8 @@ class Wavefront:
             (local,),
             self.buffers["results"],
             self.buffers["result_counts"],
-            *self.film.values(),
+            *(self.film[name] for name in ("film", "film_counts", "film_peaks")),
+            *((self.buffers["result_firsts"], self.film["film_firsts"]) if self.firsts else ()),
             self.buffers["control"],
             np.uint32(ring_pass),
             np.uint32(self.pass_samples * self.sample_jobs),
@@ -272,6 +277,13 @@ class Wavefront:
         """What walks counted so far, by name, uint64 (pixels,)."""
         counts = self._film("film_counts", (self.pixels, len(self.path_counts)), np.uint64)
         return {name: counts[:, n] for n, name in enumerate(self.path_counts)}
+
+    def first_hits(self) -> dict[str, np.ndarray]:
+        """Sums over the paths of what they first met, by field, float64 (pixels,)."""
+        if not self.firsts:
+            return {}
+        film = self._film("film_firsts", (self.pixels, len(self.firsts), 2), np.float32).astype(np.float64)
+        return {name: film[:, n, 0] + film[:, n, 1] for n, name in enumerate(self.firsts)}
 
     def peaks_by_pixel(self) -> dict[str, np.ndarray]:
         """Largest absolute sample of each pixel, and weight where a picture shows it; float32 (pixels,)."""

@@ -48,14 +48,7 @@ def test_auto_follows_the_rules_that_are_written_down(described, technique, tran
 @pytest.mark.parametrize(
     "described, choices, why, instead",
     [
-        (scene(), {"transmittance": "none"}, "point and directional", "ratio"),
-        (OVERLAPPING, {"technique": "spectral"}, "overlapping media", "delta, decomposition"),
-        (
-            OVERLAPPING,
-            {"technique": "weighted-delta"},
-            "overlapping media",
-            "delta, decomposition",
-        ),
+        (scene(), {"transmittance": "none"}, "point, spot and directional", "ratio"),
         (scene(), {"majorant_scale": 0.9}, "bounds are too low", "weighted-delta"),
         (scene(), {"majorant_scale": 0.9, "technique": "decomposition"}, "too low", "weighted-delta"),
         (

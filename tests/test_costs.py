@@ -122,7 +122,7 @@ def test_the_background_lowers_the_noise_and_leaves_the_mean(monkeypatch):
     from stat_tests import assert_same_picture
 
     with_it = render(white_chromatic_scene(0.9), spp=512, technique="spectral", seed=1)
-    monkeypatch.setattr("clvol.upload.expected_albedo", lambda medium: np.zeros(3))
+    monkeypatch.setattr("clvol.medium_table.expected_albedo", lambda medium: np.zeros(3))
     without = render(white_chromatic_scene(0.9), spp=512, technique="spectral", seed=2)
     assert_same_picture(with_it, without, tile=4)
     assert with_it.variance.mean() < 0.5 * without.variance.mean()

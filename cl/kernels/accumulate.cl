@@ -16,6 +16,9 @@ INLINE float2 add_exactly(float2 sum, float value)
 
 __kernel void accumulate_kernel(__global const float *results, __global const uint *result_counts,
                                 __global float *film, __global ulong *film_counts, __global float *film_peaks,
+#if CLVOL_FIRST_HIT
+                                __global const float *result_firsts, __global float *film_firsts,
+#endif
                                 __global uint *control, uint ring_pass, uint pass_jobs, uint samples, uint pixels)
 {
     const uint pixel = get_global_id(0);
@@ -47,6 +50,15 @@ __kernel void accumulate_kernel(__global const float *results, __global const ui
         vstore4(f, at, film);
     }
     film_peaks[(size_t)pixel * CLVOL_PEAKS] = peak;
+#if CLVOL_FIRST_HIT
+    for (uint n = 0; n < CLVOL_FIRST_HIT_FIELDS; ++n) {
+        const size_t at = (size_t)pixel * CLVOL_FIRST_HIT_FIELDS + n;
+        float2 sum = vload2(at, film_firsts);
+        for (uint job = 0; job < jobs; ++job)
+            sum = add_exactly(sum, result_firsts[(first_job + job) * CLVOL_FIRST_HIT_FIELDS + n]);
+        vstore2(sum, at, film_firsts);
+    }
+#endif
 #if CLVOL_PEAKS > 1 /* the largest weight, the last of a result's numbers */
     float weight = film_peaks[(size_t)pixel * CLVOL_PEAKS + 1];
     for (uint job = 0; job < jobs; ++job)

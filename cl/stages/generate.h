@@ -19,6 +19,7 @@ INLINE void write_result(const Scene *scene, uint slot, uint job)
     vstore3(radiance, place, scene->results);
 #endif
     write_counts(scene, slot, place);
+    write_first_hit(scene, slot, place);
     atomic_inc(scene->control + CONTROL_DONE + place / scene->render->pass_jobs);
 }
 
@@ -112,6 +113,7 @@ INLINE void start_job(const Scene *scene, uint slot, uint job)
     set_path_job(scene, slot, job);
     set_path_bounce(scene, slot, 0);
     reset_counts(scene, slot);
+    reset_first_hit(scene, slot);
 #if CLVOL_MIS
     set_path_pdf(scene, slot, 0.0f);
 #endif

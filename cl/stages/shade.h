@@ -65,6 +65,9 @@ INLINE void queue_shadow(const Scene *scene, uint group, uint slot, float3 from,
 }
 #endif
 
+#if CLVOL_FIRST_HIT
+#include "stages/first_hit.h"
+#endif
 #if CLVOL_HAS_SURFACES
 #include "stages/surface_scatter.h"
 #endif
@@ -177,6 +180,9 @@ INLINE bool shade_collision(const Scene *scene, uint group, uint slot)
 #if CLVOL_EMISSION_AT_COLLISIONS /* of overlapping media: their walks do not know which collision counts */
     if (!CLVOL_HAS_MAX_DEPTH || scene->render->max_depth > 0)
         set_radiance(scene, slot, get_radiance(scene, slot) + beta * medium_source(scene, medium, p, channel));
+#endif
+#if CLVOL_FIRST_HIT
+    first_collision(scene, slot, p, medium_albedo(scene, medium, p, channel));
 #endif
 #if CLVOL_HAS_SCATTERING
     const SampleKey key = path_key(scene, slot);

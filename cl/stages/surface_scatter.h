@@ -131,6 +131,9 @@ INLINE bool shade_surface(const Scene *scene, uint group, uint slot)
         return pass_on(scene, slot, ray, &hit, &surface);
     }
 #endif
+#if CLVOL_FIRST_HIT
+    first_surface(scene, slot, &surface, side.material);
+#endif
     key.bounce += 1;
     if (depth_is_reached(scene, slot, key.bounce, beta))
         return false;
