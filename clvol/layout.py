@@ -328,7 +328,7 @@ def path_counts(config: KernelConfig) -> tuple[str, ...]:
 
 
 def first_hit_fields(config: KernelConfig) -> list[str]:
-    """Numbers kept per path for pictures of the first hit, in order; a position comes with whether there is one."""
+    """Numbers kept per path for pictures of the first hit, in order; a position comes with its weight."""
     fields = []
     for name in config.first_hit:
         fields += [f"{name}_{c}" for c in range(registry.FIRST_HIT[name][1])]

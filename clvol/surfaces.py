@@ -106,8 +106,8 @@ def _triangles(
             log.warning("%s: %d triangles without area are left out", name, dropped)
         rows = faces[filled : filled + len(kept)]
         rows[:, :3] = mesh.faces[kept] + first
-        if shape.kind == "rectangle" and np.linalg.det(shape.to_world[:3, :3]) < 0:
-            rows[:, [1, 2]] = rows[:, [2, 1]]  # its normal goes with the transform, a mesh's with its winding
+        if np.linalg.det(shape.to_world[:3, :3]) < 0:
+            rows[:, [1, 2]] = rows[:, [2, 1]]  # a mirror turns the winding, and outside stays outside
         rows[:, 3] = number
         table[number]["normals"], table[number]["uvs"] = mesh.normals is not None, mesh.uvs is not None
         if mesh.normals is not None:
@@ -146,7 +146,5 @@ def _warn_of_flaws(shape: records.Shape) -> None:
         flaws = []
     else:
         flaws = mesh_flaws(canonical_mesh(shape.kind) if shape.kind != "mesh" else shape.mesh)
-        if not flaws and np.linalg.det(shape.to_world[:3, :3]) < 0:
-            flaws = ["its to_world mirrors it, so that its triangles face inwards"]
     for flaw in flaws:
         log.warning("%s bounds a medium, but %s: the medium may be missing or too large there", name, flaw)

@@ -58,7 +58,7 @@ def test_media_show_their_first_collisions_in_every_technique(technique):
     assert (result.aovs["normal"] == 0).all()
     for name in ("depth", "albedo", "position"):
         difference = result.aovs[name] - reference.aovs[name]
-        # a sample's spread is below its largest value (5, or 3 for a path a channel): z of the mean of all pixels
+        # a sample's spread is below its largest value: 5, or 3 for a path a channel
         bound = largest_z(3) * 5 * np.sqrt(2 / (4096 * 16))
         assert (np.abs(difference.mean((0, 1))) < bound).all(), name
         assert (np.abs(result.aovs[name]).mean((0, 1)) > 0).any()
