@@ -1,9 +1,9 @@
 """Which shapes are surfaces that rays meet, and what bounds each medium.
 
-A cube or sphere without a surface that only holds a medium is no surface: its medium is an *interval* of a
-ray, worked out afresh for every ray.  Every other shape with media is a *boundary*: a path carries one bit for
-each, set while it is inside, and a medium is present as often as boundaries that hold it, less those that name
-it as their exterior, say (METHODS §6).
+A cube or sphere without a surface that only holds a medium is no surface: its medium is an *interval* of
+a ray, worked out afresh for every ray.  Every other shape with media is a *boundary*: a path carries one bit
+for each, set while it is inside, and a medium is present as often as boundaries that hold it, less those that
+name it as their exterior, say (METHODS §6).
 """
 
 from __future__ import annotations

@@ -301,7 +301,10 @@ def path_fields(config: KernelConfig) -> list[PathField]:
         PathField("cut_energy", "f", "statistics of the slot: weight of those paths", features.depth_limited),
         PathField("largest_weight", "f", "largest weight of the path or the slot", features.media > 0),
         PathField(
-            "exhausted", "u", "statistics of the slot: walks ended by the loop bound", features.heterogeneous
+            "exhausted",
+            "u",
+            "statistics of the slot: walks ended by a loop's bound",
+            features.heterogeneous or features.passable,
         ),
     ]
     return [field for field in fields if field.needed]

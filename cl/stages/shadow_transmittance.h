@@ -106,6 +106,7 @@ INLINE Spectrum shadow_share(const Scene *scene, uint slot, Tally *tally)
             return share * transmittance;
         cross_boundary(scene->shapes + surface.shape, surface.ng, ray.d, &inside);
     }
+    set_path_exhausted(scene, slot, path_exhausted(scene, slot) + 1);
     return (Spectrum)(0.0f);
 #else
 #if CLVOL_HAS_SURFACES

@@ -14,7 +14,10 @@ INLINE bool pass_on(const Scene *scene, uint slot, Ray ray, const Hit *hit, cons
     set_path_after_primitive(scene, slot, hit->primitive);
     const uint stretch = path_stretch(scene, slot) + 1;
     set_path_stretch(scene, slot, stretch);
-    return stretch < MOST_PASSED;
+    if (stretch < MOST_PASSED)
+        return true;
+    set_path_exhausted(scene, slot, path_exhausted(scene, slot) + 1);
+    return false;
 }
 #endif
 

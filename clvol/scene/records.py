@@ -190,9 +190,9 @@ class Mesh:
 class Shape:
     """A surface: what it looks like, what it emits, and which media it divides.
 
-    kind : under `to_world` the "cube" (−1..1)³, the unit "sphere", the "rectangle" (−1..1)² with normal +z,
-        the unit "disk" with normal +z, the "cylinder" of radius 1 and z in 0..1 (open, normals outward), or the
-        "mesh" in `mesh`.
+    kind : under `to_world` the "cube" (−1..1)³, the unit "sphere", the "rectangle" (−1..1)² with normal
+        +z, the unit "disk" with normal +z, the "cylinder" of radius 1 and z in 0..1 (open, normals outward),
+        or the "mesh" in `mesh`.
     interior, exterior : media behind the surface and before it (the side its normals point to).
     emission : radiance of the front side; None where the shape is no light.
     flip_normals : front and back change places.
