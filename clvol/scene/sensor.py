@@ -35,6 +35,7 @@ class Sensor:
 def perspective(reader: Reader) -> Sensor:
     """The `perspective` plugin; a focal length is for 35 mm film, along the diagonal."""
     camera = _pinhole(reader)
+    reader.ignore("focus_distance")  # everything is sharp
     offset = tuple(reader.number(f"principal_point_offset_{axis}", 0.0) for axis in "xy")
     return _sensor(reader, replace(camera, principal_point_offset=offset))
 
