@@ -72,8 +72,10 @@ class Boundaries:
 def find_boundaries(scene: records.Scene) -> Boundaries:
     """Sort a scene's shapes into surfaces, intervals and boundaries; a pure function of the records."""
     shapes = scene.shapes
-    exteriors = {id(s.exterior) for s in shapes if s.exterior is not None}
-    holders = Counter(id(s.interior) for s in shapes if s.interior is not None)
+    divides = [shape.interior is not shape.exterior for shape in shapes]
+    pairs = [(s.interior, s.exterior) for s, does in zip(shapes, divides, strict=True) if does]
+    exteriors = {id(outside) for _, outside in pairs if outside is not None}
+    holders = Counter(id(inside) for inside, _ in pairs if inside is not None)
     entries: list[MediumEntry] = []
     entry_of: dict[int, int] = {}  # of media that boundaries name
     surfaces, dividing = [], []
@@ -83,10 +85,9 @@ def find_boundaries(scene: records.Scene) -> Boundaries:
                 entry_of[id(shape.interior)] = len(entries)
             entries.append(MediumEntry(shape.interior, shape))
             continue
-        divides = shape.interior is not shape.exterior
-        if divides:
+        if divides[index]:
             dividing.append(index)
-        if divides or shape.emission is not None or not isinstance(shape.bsdf, Null):
+        if divides[index] or shape.emission is not None or not isinstance(shape.bsdf, Null):
             surfaces.append(index)
     for index in dividing:
         shape = shapes[index]
@@ -190,7 +191,11 @@ def camera_may_be_inside(scene: records.Scene, found: Boundaries) -> bool:
     """Conservative: whether rays may start within a boundary's bounds."""
     sensor = scene.sensor
     eye = sensor.to_world[:3, 3]
-    reach = 2.0 * sensor.near_clip * 16.0 + sensor.aperture_radius
+    width, height = scene.film.width, scene.film.height
+    tangent = np.tan(np.radians(sensor.fov) / 2) * max(width / height, height / width)
+    aside = tangent * (2 + 2 * max(map(abs, sensor.principal_point_offset)))
+    near_point = sensor.near_clip * (1 + 2 * aside)  # the farthest point of the near plane in view
+    reach = near_point + sensor.aperture_radius * (1 + sensor.near_clip / sensor.focus_distance)
     for boundary in found.boundaries:
         lower, upper = shape_bounds(scene.shapes[boundary.shape])
         if (eye + reach >= lower).all() and (eye - reach <= upper).all():

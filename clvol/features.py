@@ -215,7 +215,7 @@ def _surface_features(
         "material_tables": any(map(has_tables, bsdfs)),
         "reflecting": any(map(reflects, bsdfs)),
         "samples_at_surfaces": any(map(samples_lights, bsdfs)),
-        "passable": any(map(passes_light, bsdfs)),
+        "passable": any(map(passes_light, bsdfs)) or (bool(lamps) and scene.integrator.hide_emitters),
         "transmissive": any(map(is_transmissive, bsdfs)),
         "boundaries": len(found.boundaries),
         "camera_inside": camera_may_be_inside(scene, found),

@@ -285,7 +285,9 @@ def render_record(prepared: PreparedScene, seed: int) -> np.ndarray:
     record["filter_radius"] = scene.film.rfilter.radius
     record["filter_bins"] = FILTER_BINS
     record["sample_border"] = int(scene.film.sample_border)
-    rays = camera_rays(scene.sensor, scene.film, prepared.centre, prepared.radius)
+    everywhere = any(entry.everywhere for entry in prepared.boundaries.entries)
+    reach = np.inf if everywhere else prepared.radius  # of what a ray can meet
+    rays = camera_rays(scene.sensor, scene.film, prepared.centre, reach)
     for field, value in {
         "camera_eye": rays.eye,
         "camera_position": rays.position,

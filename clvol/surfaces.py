@@ -25,6 +25,7 @@ QUADRICS = ("sphere", "disk", "cylinder")
 """Kinds of shape that are met as quadrics; a "cube" and a "rectangle" are triangles."""
 
 _CHUNK = 1 << 17
+INWARDS = "triangles that face inwards"
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,8 +144,18 @@ def _warn_of_flaws(shape: records.Shape) -> None:
     if shape.kind in ("rectangle", "disk", "cylinder"):
         flaws = [f"a {shape.kind} is open"]
     elif shape.kind == "sphere":
-        flaws = []
+        flaws = _turned([], shape.flip_normals)
     else:
         flaws = mesh_flaws(canonical_mesh(shape.kind) if shape.kind != "mesh" else shape.mesh)
+        flaws = _turned(flaws, shape.flip_normals)
     for flaw in flaws:
         log.warning("%s bounds a medium, but %s: the medium may be missing or too large there", name, flaw)
+
+
+def _turned(flaws: list[str], turned: bool) -> list[str]:
+    """The flaws of a closed surface once flip_normals has turned it inside out."""
+    if not turned:
+        return flaws
+    if any(INWARDS in flaw for flaw in flaws):
+        return []
+    return flaws or ["flip_normals turns it inside out"]

@@ -28,8 +28,8 @@ INLINE void intersect(const Scene *scene, uint group, uint slot)
 #if CLVOL_HAS_STRETCHES
     const Inside inside = get_inside(scene, slot);
     Part part = {-1, 0.0f, 0.0f};
-    if (next_part(scene, ray, &inside, path_after(scene, slot), path_reach(scene, slot), ray_limit(scene, slot, ray),
-                  &part)) {
+    if (next_part(scene, ray, &inside, path_after(scene, slot), stretch_end(scene, slot, ray),
+                  ray_limit(scene, slot, ray), &part)) {
         queue_push(scene, group, QUEUE_MEDIUM, slot);
         return;
     }

@@ -27,7 +27,7 @@ INLINE void medium_sample(const Scene *scene, uint group, uint slot)
     const Ray ray = path_ray(scene, slot);
     const Inside inside = get_inside(scene, slot);
     const uint stretch = path_stretch_or_zero(scene, slot);
-    const float from = path_after(scene, slot), to = path_reach(scene, slot);
+    const float from = path_after(scene, slot), to = stretch_end(scene, slot, ray);
     const Spectrum before = get_beta(scene, slot);
     Tally tally = {0, 0, 0, 0, 0, 0, 0.0f};
     Collision collision;

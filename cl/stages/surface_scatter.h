@@ -25,8 +25,6 @@ INLINE bool pass_on(const Scene *scene, uint slot, Ray ray, const Hit *hit, cons
 /* Light of a lamp that the path has run into. */
 INLINE void gather_lamp(const Scene *scene, uint slot, Ray ray, const Hit *hit, const Surface *surface)
 {
-    if (CLVOL_HIDE_EMITTERS && path_bounce(scene, slot) == 0)
-        return;
 #if CLVOL_HAS_MAX_DEPTH
     if (scene->render->max_depth == 0)
         return;
@@ -58,7 +56,7 @@ INLINE void surface_next_event(const Scene *scene, uint group, uint slot, Sample
                                   on_side(side, to_local(surface, light.direction)), channel, &pdf);
     const float weight = light.pdf > 0.0f ? mis_weight(light.pdf, pdf) : 1.0f;
     const Spectrum value = beta * f * to_spectrum(light.value, channel) * weight;
-    if (!(spectrum_max(value) > 0.0f))
+    if (spectrum_max(value) == 0.0f)
         return;
     Inside inside = get_inside(scene, slot);
     cross_boundary(scene->shapes + surface->shape, surface->ng, light.direction, &inside);
@@ -77,11 +75,11 @@ INLINE bool leave_surface(const Scene *scene, uint slot, SampleKey key, const Su
     set_path_eta_squared(scene, slot, eta_squared);
     survival *= eta_squared;
 #endif
-    if (!(survival > 0.0f))
+    if (survival == 0.0f) /* not so for NaN, which is to be seen */
         return false;
     if (key.bounce > scene->render->rr_depth && survival < 1.0f) {
         const uint4 k = decision_block(render_seed(scene), key, BLOCK_DIRECTION, 0);
-        if (!(uniform_float(k.z) < survival))
+        if (uniform_float(k.z) >= survival)
             return false;
         beta /= survival;
     }
@@ -105,6 +103,10 @@ INLINE bool shade_surface(const Scene *scene, uint group, uint slot)
     const Hit hit = path_hit(scene, slot);
     const Surface surface = hit_surface(scene, ray, &hit);
     __global const Shape *shape = scene->shapes + surface.shape;
+#if CLVOL_HAS_AREA && CLVOL_HIDE_EMITTERS /* the camera sees through lamps, as in Mitsuba */
+    if (shape->emitter >= 0 && path_bounce(scene, slot) == 0)
+        return pass_on(scene, slot, ray, &hit, &surface);
+#endif
 #if CLVOL_HAS_AREA
     if (shape->emitter >= 0)
         gather_lamp(scene, slot, ray, &hit, &surface);

@@ -106,7 +106,8 @@ def _shape(reader: Reader, kind: str, to_world: np.ndarray, triangles: Mesh | No
     media = _media(reader)
     emission = _emission(reader)
     bsdf = reader.only_child("bsdf")
-    if bsdf is None and media:
+    inside = media.get("interior")
+    if bsdf is None and inside is not None and inside is not media.get("exterior"):
         log.warning(
             "%s: the shape has a medium but no BSDF, so it is diffuse and hides the medium; "
             'add <bsdf type="null"/> to look into it',
