@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from clvol.registry import FAMILIES
+from clvol.registry import AOVS, FAMILIES
 from clvol.scene.loader import PLUGINS
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -41,6 +41,23 @@ def test_the_examples_run_in_turn(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.chdir(tmp_path)
     exec("\n".join(examples), {})
     assert (tmp_path / "cloud.exr").stat().st_size > 10000
+
+
+def test_the_gallery_shows_pictures_of_scenes_that_are_there() -> None:
+    gallery = README.split("## Gallery")[1].split("\n## ")[0]
+    pictures = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", gallery)
+    assert len(pictures) >= 4
+    for picture in pictures:
+        assert (ROOT / picture).stat().st_size <= 300_000
+        assert f"scenes/{Path(picture).stem}.xml" in gallery
+    for scene in (ROOT / "scenes").glob("*.xml"):
+        assert scene.name in gallery
+
+
+@pytest.mark.parametrize("aov", AOVS)
+def test_the_table_lists_every_aov(aov: str) -> None:
+    table = README.split("| AOVs |")[1].split("\n\n")[0]
+    assert f"`{aov}`" in table
 
 
 @pytest.mark.parametrize("listed", ["clvol", "cl", "scenes", "tests", "tools", ".ci/run", "CONTRIBUTING.md"])

@@ -10,11 +10,13 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+import click
 import numpy as np
 import pytest
 
 import clvol
-from clvol.scene.records import GridVolume
+from clvol.scene.mesh import mesh_flaws
+from clvol.scene.records import GridVolume, Mesh
 
 ROOT = Path(__file__).resolve().parent.parent
 TOOLS = ROOT / "tools"
@@ -142,3 +144,59 @@ def test_bench_grids_are_seeded_coefficients_that_load(tool, tmp_path: Path, kin
     np.testing.assert_array_equal(values, np.load(tmp_path / "b.npy"))
     scene = clvol.load_dict(tool("bench_costs").grid_scene(tmp_path / "a.npy", 8))
     assert isinstance(scene.shapes[0].interior.sigma_t, GridVolume)
+
+
+# --- bench: rays and room --------------------------------------------------------------------------
+
+
+def test_embree_is_taken_from_this_python_where_it_is(tool, monkeypatch: pytest.MonkeyPatch) -> None:
+    rays = tool("bench_rays")
+    monkeypatch.setattr(rays.importlib.util, "find_spec", lambda name: object())
+    assert rays.embree_environment() == {}
+
+
+def test_a_missing_embree_is_installed_or_told(
+    tool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rays = tool("bench_rays")
+    monkeypatch.setattr(rays.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    failed = subprocess.CompletedProcess([], returncode=1)
+    monkeypatch.setattr(rays.subprocess, "run", lambda *args, **kwargs: failed)
+    with pytest.raises(click.ClickException, match="embreex"):
+        rays.embree_environment()
+    assert str(tmp_path) in capsys.readouterr().err
+    (tmp_path / "clvol" / "embreex" / "embreex").mkdir(parents=True)
+    assert rays.embree_environment()["PYTHONPATH"].startswith(str(tmp_path / "clvol" / "embreex"))
+
+
+@pytest.mark.parametrize(("z", "status"), [(1.0, 0), (-5.0, 1)])
+def test_pictures_that_differ_are_the_exit_status(tool, z: float, status: int) -> None:
+    finish = tool("bench").finish
+    assert finish((None, {"cloud": {"z": 0.0}, "room": {"z": z}})) == status
+
+
+def test_ray_meshes_are_closed_and_of_the_size_asked_for(tool) -> None:
+    vertices, faces = tool("bench_rays").knobbly_sphere(3000)
+    assert abs(len(faces) - 3000) < 200
+    a, b, c = vertices[faces].swapaxes(0, 1)
+    assert np.linalg.norm(np.cross(b - a, c - a), axis=1).min() > 0
+
+
+# --- make_scenes -----------------------------------------------------------------------------------
+
+
+def test_the_plume_is_the_committed_one_and_empty_at_its_border(tool) -> None:
+    plume = tool("make_scenes").make_plume()
+    committed = np.frombuffer((ROOT / "scenes" / "plume.vol").read_bytes(), "<f4", offset=48)
+    np.testing.assert_allclose(committed.reshape(plume.shape), plume, atol=1.01 / 255)  # sines may differ
+    inner = plume.copy()
+    inner[1:-1, 1:-1, 1:-1] = 0
+    assert not inner.any() and plume.max() <= 1
+
+
+def test_the_knot_is_the_committed_one_and_a_closed_outward_surface(tool) -> None:
+    vertices, normals, faces = tool("make_scenes").make_knot()
+    mesh = clvol.load_file(ROOT / "scenes" / "jade.xml").shapes[-1].mesh
+    np.testing.assert_allclose(mesh.vertices, vertices, atol=1e-5)
+    assert not mesh_flaws(Mesh(vertices, faces, normals))

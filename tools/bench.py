@@ -15,6 +15,8 @@ from pathlib import Path
 import bench_cloud
 import bench_costs
 import bench_pool
+import bench_rays
+import bench_room
 import click
 from bench_tables import Figures, save
 from mitsuba_side import mitsuba_python
@@ -38,7 +40,8 @@ def finish(outcome: Outcome) -> int:
     """Write the figures where asked to; the exit status is 1 if two programs' pictures differ."""
     json_path, figures = outcome
     save(json_path, figures)
-    return 0 if "cloud" not in figures or bench_cloud.agrees(figures["cloud"]) else 1
+    compared = [figures[name] for name in ("cloud", "room") if name in figures]
+    return 0 if all(bench_cloud.agrees(sides) for sides in compared) else 1
 
 
 def json_option(command: Callable) -> Callable:
@@ -67,14 +70,29 @@ mitsuba_option = click.option(
 )
 
 
+def efficiency_options(scene: str) -> Callable:
+    """The options of a comparison with Mitsuba."""
+
+    def add(command: Callable) -> Callable:
+        for option in (
+            json_option,
+            choice_options,
+            click.option(
+                "--seconds", type=float, default=3.0, show_default=True, help="Length of a side's turn."
+            ),
+            rounds_option(5),
+            click.option("--res", type=click.IntRange(min=1), default=128, show_default=True),
+            click.option("--scene", default=scene, metavar="SCENE", help="A scene that has $res."),
+            mitsuba_option,
+        ):
+            command = option(command)
+        return command
+
+    return add
+
+
 @main.command()
-@mitsuba_option
-@click.option("--scene", default=CLOUD, metavar="SCENE", help="A scene that has $res.")
-@click.option("--res", type=click.IntRange(min=1), default=128, show_default=True)
-@rounds_option(5)
-@click.option("--seconds", type=float, default=3.0, show_default=True, help="Length of a side's turn.")
-@choice_options
-@json_option
+@efficiency_options(CLOUD)
 def cloud(
     mitsuba: str | None,
     scene: str,
@@ -89,6 +107,34 @@ def cloud(
     figures = bench_cloud.measure_cloud(scene, res, rounds, seconds, mitsuba_python(mitsuba), choices, device)
     bench_cloud.show_cloud(figures)
     return json_path, {"cloud": figures}
+
+
+@main.command()
+@efficiency_options(bench_room.ROOM)
+def room(
+    mitsuba: str | None,
+    scene: str,
+    res: int,
+    rounds: int,
+    seconds: float,
+    device: str | None,
+    json_path: str | None,
+    **choices: str,
+) -> Outcome:
+    """The same in a room of smoke and glass, and the time of each stage."""
+    figures = bench_room.measure_room(scene, res, rounds, seconds, mitsuba_python(mitsuba), choices, device)
+    bench_room.show_room(figures)
+    return json_path, {"room": figures}
+
+
+@main.command()
+@rounds_option(5)
+@json_option
+def rays(rounds: int, json_path: str | None) -> Outcome:
+    """Rays per second beside Embree's on one thread, and what building the hierarchy costs."""
+    figures = bench_rays.measure_rays(rounds)
+    bench_rays.show_rays(figures)
+    return json_path, {"rays": figures}
 
 
 @main.command()
@@ -154,6 +200,8 @@ def everything(context: click.Context, mitsuba: str | None, json_path: str | Non
     figures: Figures = {}
     for command, arguments in (
         (cloud, {"mitsuba": mitsuba}),
+        (room, {"mitsuba": mitsuba}),
+        (rays, {}),
         (startup, {}),
         (load, {}),
         (memory, {}),

@@ -87,7 +87,7 @@ def _side_figures(side: Rounds) -> Figures:
     }
 
 
-def show_cloud(figures: Figures) -> None:
+def show_cloud(figures: Figures, name: str = "cloud", target: float = EFFICIENCY_TARGET) -> None:
     """Both sides, the ratio, and whether the pictures agree."""
     sides = [figures["clvol"], figures["mitsuba"]]
     rows = [
@@ -101,11 +101,11 @@ def show_cloud(figures: Figures) -> None:
         ("CPU seconds to load and prepare, once", *(f"{s['setup_cpu']:.2f}" for s in sides)),
     ]
     names = [f"clvol {sides[0]['version']}", f"Mitsuba {sides[1]['version']} scalar_rgb"]
-    show(f"cloud: {figures['rounds']} rounds by turns, {thread_count()} threads", ["", *names], rows)
+    show(f"{name}: {figures['rounds']} rounds by turns, {thread_count()} threads", ["", *names], rows)
     ratio = figures["ratio"]
     print(
         f"efficiency, clvol over Mitsuba: {ranged(ratio)} over rounds, 95 % interval {ratio['low']:.3g} to "
-        f"{ratio['high']:.3g}; {against(ratio['median'], EFFICIENCY_TARGET, at_least=True)}"
+        f"{ratio['high']:.3g}; {against(ratio['median'], target, at_least=True)}"
     )
     verdict = "they agree" if agrees(figures) else "THEY DIFFER"
     print(f"difference of the means: z = {figures['z']:+.2f}, {verdict}")

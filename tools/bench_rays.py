@@ -1,6 +1,6 @@
 """Rays per second on one thread, closest hit, beside Embree (through embreex), and what the hierarchy costs.
 
-    python tools/bench_rays.py          needs `pip install embreex`
+    python tools/bench_rays.py          installs embreex in a cache where there is none
 
 Both sides trace the same rays through the same mesh by turns: ours is the kernel's time by the device's
 clock, Embree's the time of the one call that traces them all.  Measuring is left to a process of its own,
@@ -9,6 +9,7 @@ since PoCL reads its number of threads when it starts.
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import subprocess
@@ -16,6 +17,7 @@ import sys
 import time
 from pathlib import Path
 
+import click
 import numpy as np
 import pyopencl as cl
 from bench_costs import peak_bytes
@@ -26,6 +28,7 @@ from clvol import programs
 from clvol.accel.bvh import Bvh, build_bvh
 from clvol.device import Device, open_device
 
+REQUIREMENT = "embreex"
 SIZES = (70_000, 1_000_000)
 EDGE = 1024
 RATIO_TARGET, BUILD_TARGET, MEMORY_TARGET = 0.5, 15.0, 10.0
@@ -175,12 +178,26 @@ def build_costs() -> Figures:
     }
 
 
+def embree_environment() -> dict[str, str]:
+    """Variables with which Python finds embreex: its own, else that of a cached folder, filled when empty."""
+    if importlib.util.find_spec("embreex"):
+        return {}
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    folder = cache / "clvol" / "embreex"
+    if not (folder / "embreex").exists():
+        click.echo(f"installing {REQUIREMENT} in {folder}", err=True)
+        pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", str(folder)]
+        if subprocess.run([*pip, REQUIREMENT]).returncode:
+            raise click.ClickException(f"no {REQUIREMENT}; what pip said stands above")
+    return {"PYTHONPATH": os.pathsep.join(filter(None, [str(folder), os.environ.get("PYTHONPATH")]))}
+
+
 def measure_rays(rounds: int) -> Figures:
     """Both measurements, each in a process of its own and on one thread.
 
-    Raises subprocess.CalledProcessError, after the process' own message, where embreex is missing.
+    Raises click.ClickException where there is no embreex.
     """
-    one_thread = os.environ | {"POCL_MAX_PTHREAD_COUNT": "1"}
+    one_thread = os.environ | embree_environment() | {"POCL_MAX_PTHREAD_COUNT": "1"}
     figures = {}
     for name in ("build", "rates"):
         command = [sys.executable, __file__, name, str(rounds)]

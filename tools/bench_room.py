@@ -1,0 +1,44 @@
+"""Efficiency beside Mitsuba's in a room with surfaces, glass and smoke, and where our time goes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bench_cloud import measure_cloud, show_cloud
+from bench_tables import Figures, show
+from scene_options import open_scene
+
+ROOM = str(Path(__file__).resolve().parent.parent / "scenes" / "room.xml")
+EFFICIENCY_TARGET = 5.0
+
+
+def stage_seconds(scene: str, res: int, choices: dict[str, str], device: str | None) -> Figures:
+    """Device seconds of each stage in one render, kernels built and loaded before."""
+    opened = open_scene(scene, {"res": res}, choices, device)
+    opened.session(0).run(0, 1, None, None, lambda: False)
+    session = opened.session(1)
+    done = session.run(0, 16, None, None, lambda: False)
+    stats = session.result(0, done, 0.0).stats["seconds"]
+    return {stage: stats[stage] for stage in opened.config().stages}
+
+
+def measure_room(
+    scene: str,
+    res: int,
+    rounds: int,
+    seconds: float,
+    python: str,
+    choices: dict[str, str],
+    device: str | None,
+) -> Figures:
+    """Render by turns; efficiency, means and their difference, and the share of each stage."""
+    figures = measure_cloud(scene, res, rounds, seconds, python, choices, device)
+    return figures | {"stages": stage_seconds(scene, res, choices, device)}
+
+
+def show_room(figures: Figures) -> None:
+    """Both sides, the ratio, whether the pictures agree, and the stages."""
+    show_cloud(figures, "room", EFFICIENCY_TARGET)
+    total = sum(figures["stages"].values())
+    rows = [(stage, f"{100 * seconds / total:.0f} %") for stage, seconds in figures["stages"].items()]
+    show("room: device time by stage", ["", "share"], rows)
