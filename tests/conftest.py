@@ -8,6 +8,25 @@ import pytest
 SCENES = Path(__file__).resolve().parent.parent / "scenes"
 
 
+def pytest_addoption(parser):
+    parser.addoption(
+        "--mitsuba",
+        action="store_true",
+        help="compare with Mitsuba 3.9 too, in an environment made for it unless CLVOL_MITSUBA names a "
+        "Python that has it",
+    )
+
+
+def pytest_collection_modifyitems(config, items):
+    """Tests marked `mitsuba` run when asked for: they take minutes, and may install Mitsuba."""
+    if config.getoption("--mitsuba") or os.environ.get("CLVOL_MITSUBA"):
+        return
+    skip = pytest.mark.skip(reason="compares with Mitsuba 3.9: give --mitsuba, or set CLVOL_MITSUBA")
+    for item in items:
+        if item.get_closest_marker("mitsuba"):
+            item.add_marker(skip)
+
+
 @pytest.fixture(scope="session")
 def device():
     """The device that CLVOL_DEVICE selects, else the default one."""

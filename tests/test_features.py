@@ -16,6 +16,7 @@ from probe import Probe, medium_of, scene_of
 import clvol
 from clvol import layout, programs
 from clvol.choices import Choices, prepare_for
+from clvol.scene.materials import Conductor, Dielectric, Diffuse, Mask
 from clvol.scene.records import (
     ConstantEmitter,
     ConstVolume,
@@ -287,6 +288,80 @@ def test_the_filter_table_comes_with_a_filter_and_the_depth_count_with_a_limit(d
 def test_what_render_reports_is_what_the_config_says(device):
     result = clvol.render(SCENES["fog under a sky"], spp=16)
     assert result.stats["bytes_per_slot"] == bytes_per_slot(config_of(device, SCENES["fog under a sky"]))
+
+
+# -- surfaces ----------------------------------------------------------------------------------------
+
+
+SURFACE_CODE = (
+    "geometry/bvh",
+    "geometry/surface",
+    "geometry/triangle",
+    "geometry/quadric",
+    "bsdf/",
+    "texture/",
+)
+MEDIUM_CODE = (
+    "tracking/d",
+    "tracking/h",
+    "density/",
+    "majorant/",
+    "phase/",
+    "stages/medium",
+    "stages/stretch",
+)
+PLAIN = replace(ball((0.5, 0.5, 0.5), 0.4), bsdf=Diffuse())
+
+
+def held(config, words):
+    return {f for f in headers(config) if f.startswith(words)}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_scenes_without_surfaces_hold_no_geometry_code(device, name):
+    config = config_of(device, SCENES[name])
+    assert not held(config, (*SURFACE_CODE, "emitter/area", "stages/boundary"))
+    assert not [a for a in argument_names(config) if a.startswith(("bvh_", "shapes", "materials", "faces"))]
+    assert not [
+        f for f in field_names(config) if f.startswith(("hit_primitive", "hit_t", "inside", "shadow_inside"))
+    ]
+
+
+def test_scenes_without_media_hold_no_tracking_code(device):
+    config = config_of(device, scene([PLAIN], [SKY, LAMP]))
+    assert not held(config, MEDIUM_CODE) and "medium_sample" not in config.stages
+    assert not argument_names(config) & {"media", "phases", "volumes", "bricks", "majorants"}
+    assert not field_names(config) & {"medium", "interval_end"}
+
+
+@pytest.mark.parametrize(
+    "bsdf, files",
+    [
+        (Diffuse(), {"diffuse"}),
+        (Dielectric(), {"dielectric", "fresnel"}),
+        (Conductor(), {"conductor", "fresnel"}),
+    ],
+)
+def test_only_the_bsdfs_of_a_scene_are_composed(device, bsdf, files):
+    config = config_of(device, scene([replace(PLAIN, bsdf=bsdf)], [SKY]))
+    assert held(config, "bsdf/") == {f"bsdf/{name}.h" for name in files | {"bsdf", "sample"}}
+
+
+def test_what_only_passable_or_transmissive_surfaces_need_comes_with_them(device):
+    opaque, glass, veil = (
+        config_of(device, scene([replace(PLAIN, bsdf=b)], [SKY]))
+        for b in (Diffuse(), Dielectric(), Mask(Diffuse()))
+    )
+    assert "eta_squared" in field_names(glass) and "eta_squared" not in field_names(opaque) | field_names(
+        veil
+    )
+    assert "after_t" in field_names(veil) and "after_t" not in field_names(opaque) | field_names(glass)
+
+
+def test_a_camera_looks_for_what_it_is_inside_of_only_where_it_may_be(device):
+    for centre, inside in ((0.5, 0.5, 0.0), 0), ((0.5, 0.5, -2.0), 1):
+        shape = replace(ball(centre, 0.4, homogeneous(1.0, 0.5)), bsdf=Dielectric())
+        assert config_of(device, scene([shape])).defines()["CLVOL_CAMERA_INSIDE"] == inside
 
 
 # -- the device --------------------------------------------------------------------------------------

@@ -87,8 +87,9 @@ def test_a_weight_reset_at_the_exit_is_caught(mutate):
     assert_matches(chromatic_furnace(), [1.0, 0.999, 1.0], bias=0.02)
     mutate(
         "stages/medium_sample.h",
-        "    set_beta(scene, slot, collision.beta);",
-        "    if (collided)\n        set_beta(scene, slot, collision.beta);",
+        "    record_walk(scene, slot, tally, collision.beta, collision.emission);",
+        "    const Spectrum kept = collided ? collision.beta : (Spectrum)(1.0f);\n"
+        "    record_walk(scene, slot, tally, kept, collision.emission);",
     )
     with pytest.raises(AssertionError, match="deviates"):
         assert_matches(chromatic_furnace(), [1.0, 0.999, 1.0], bias=0.02)

@@ -76,7 +76,8 @@ INLINE void queue_shadow(const Scene *scene, uint group, uint slot, float3 from,
 /* Absorption at a collision (METHODS §2): by event, by weight, or by weight as long as the path's weight
    is worth following and by event below.  Each multiplies the expected weight by the albedo.  By event, a path
    of several channels chooses between scattering and absorption as it does between events of its walk. */
-INLINE bool survives_absorption(const Scene *scene, SampleKey key, uint interval, Spectrum albedo, Spectrum *beta)
+INLINE bool survives_absorption(const Scene *scene, uint slot, SampleKey key, uint interval, Spectrum albedo,
+                                Spectrum *beta)
 {
     float survival = 1.0f;
     if (CLVOL_ABSORPTION == ABSORPTION_SAMPLE) {
@@ -90,7 +91,10 @@ INLINE bool survives_absorption(const Scene *scene, SampleKey key, uint interval
 #endif
     } else {
         *beta *= albedo;
-        const float weight = spectrum_max(*beta);
+        float weight = spectrum_max(*beta);
+#if CLVOL_HAS_TRANSMISSION
+        weight *= path_eta_squared(scene, slot);
+#endif
         if (CLVOL_ABSORPTION == ABSORPTION_MIXED)
             survival = min_of(1.0f, weight * (1.0f / MIXED_WEIGHT));
         else
@@ -186,7 +190,7 @@ INLINE bool shade_collision(const Scene *scene, uint group, uint slot)
 #endif
 #if CLVOL_HAS_SCATTERING
     const SampleKey key = path_key(scene, slot);
-    if (!survives_absorption(scene, key, interval, medium_albedo(scene, medium, p, channel), &beta))
+    if (!survives_absorption(scene, slot, key, interval, medium_albedo(scene, medium, p, channel), &beta))
         return false;
     return scatter(scene, group, slot, key, medium, beta);
 #else

@@ -58,10 +58,11 @@ INLINE float shadow_reach(const Scene *scene, uint slot)
 }
 
 #if CLVOL_HAS_SURFACES
-/* Up to where a surface blocks the light: short of the lamp that it comes from, by what rounding may take. */
+/* Up to where a surface blocks the light: short of the lamp that it comes from, by what rounding may take.  At the
+   rim of a sphere that is the root of what it is elsewhere. */
 INLINE float blocking_reach(Ray ray, float reach)
 {
-    return reach - (largest3(ray.o) + reach) * 0x1p-18f;
+    return reach - (largest3(ray.o) + reach) * (CLVOL_HAS_AREA_SPHERE ? 0x1p-10f : 0x1p-18f);
 }
 #endif
 
