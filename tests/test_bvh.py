@@ -189,7 +189,6 @@ def test_spot_has_no_leaks(device, data):
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     inside = mesh.triangles_center[::600] - 0.01 * mesh.face_normals[::600]
     assert mesh.is_watertight
-    assert mesh.contains(inside).all()
     caster = Caster(device, vertices, faces)
     for origin in inside.astype(np.float32):
         assert caster.any(np.tile(origin, (len(vertices), 1)), vertices - origin).all()

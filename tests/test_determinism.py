@@ -157,7 +157,7 @@ def interrupted_render(signals=1):
     def press(progress):
         while left[0]:
             left[0] -= 1
-            os.kill(os.getpid(), signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)  # to this thread, one after the other
 
     return clvol.render(scene(), spp=50 * SPP, seed=7, progress=press)
 
