@@ -3,6 +3,7 @@
 Numbers called Mitsuba's were printed by version 3.9.1 (scalar_rgb).
 """
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from clvol.scene.materials import Diffuse
 from clvol.scene.records import ConstantEmitter, ConstVolume, Film, Integrator, Phase, ReconstructionFilter
 from clvol.volumes import SparseGrid, write_vol
 
-DATA = Path("/work/shared/data")
+DATA = Path(os.environ.get("CLVOL_DATA", "no such folder"))
 SCENES = Path(__file__).parents[1] / "scenes"
 
 
@@ -300,7 +301,7 @@ def test_vdb_samples_sit_at_index_positions_under_the_files_transform(vdb):
     np.testing.assert_array_equal(same.lower, volume.lower)
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason="the shared data folder is missing")
+@pytest.mark.skipif(not DATA.is_dir(), reason="CLVOL_DATA is not set")
 def test_the_boxes_of_real_vdb_files():
     fire = interior(sigma_t={"type": "vdbvolume", "filename": str(DATA / "fire.vdb")}).sigma_t
     assert (fire.lower.tolist(), fire.upper.tolist()) == ([4, 2, 6], [76, 75, 126])
@@ -311,7 +312,7 @@ def test_the_boxes_of_real_vdb_files():
     )
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason="the shared data folder is missing")
+@pytest.mark.skipif(not DATA.is_dir(), reason="CLVOL_DATA is not set")
 def test_real_environments_load():
     assert emitter(type="envmap", filename=str(DATA / "sunset.exr")).radiance.max() == 6248.0
 
