@@ -245,7 +245,7 @@ def path_fields(config: KernelConfig) -> list[PathField]:
         *(
             PathField(name, "u", f"{meaning}, of the path (if a picture shows them) or the slot", needed)
             for name, meaning, needed in (
-                ("lookups", "density look-ups", True),
+                ("lookups", "density look-ups", features.heterogeneous),
                 ("tentative", "tentative collisions", features.media > 0),
                 ("real", "real collisions", features.media > 0),
                 ("cells", "majorant cells crossed", features.heterogeneous),
@@ -330,6 +330,11 @@ def path_counts(config: KernelConfig) -> tuple[str, ...]:
     return tuple(name for name in registry.COUNTS if name in shown and name in kept)
 
 
+def counts_per_path(config: KernelConfig) -> int:
+    """Numbers that a finished path writes beside its radiance: counts, and its largest weight if shown."""
+    return len(path_counts(config)) + shows_weight(config)
+
+
 def first_hit_fields(config: KernelConfig) -> list[str]:
     """Numbers kept per path for pictures of the first hit, in order; a position comes with its weight."""
     fields = []
@@ -374,7 +379,7 @@ def arguments(config: KernelConfig) -> list[Argument]:
         Argument("counts", "__global uint *"),
         Argument("control", "__global uint *"),
         Argument("results", "__global float *"),
-        Argument("result_counts", "__global uint *"),
+        Argument("result_counts", "__global uint *", counts_per_path(config) > 0),
         Argument("result_firsts", "__global float *", bool(config.first_hit)),
         Argument("media", "__global const Medium *", features.media > 0),
         Argument("boundary_masks", "__global const uint *", features.boundaries > 0),
@@ -492,7 +497,6 @@ def _inside_text(config: KernelConfig) -> list[str]:
 def _counts_text(config: KernelConfig) -> list[str]:
     """How a path's counts are begun and written; its largest weight, if it is kept, comes last."""
     counts, weight = path_counts(config), shows_weight(config)
-    stride = len(counts) + weight
     reset = [f"set_path_{name}(scene, slot, 0);" for name in counts]
     write = [
         f"scene->result_counts[place * CLVOL_RESULT_COUNTS + {n}u] = path_{name}(scene, slot);"
@@ -506,7 +510,7 @@ def _counts_text(config: KernelConfig) -> list[str]:
         )
     return [
         f"#define CLVOL_PATH_COUNTS {len(counts)}u",
-        f"#define CLVOL_RESULT_COUNTS {stride}u",
+        f"#define CLVOL_RESULT_COUNTS {counts_per_path(config)}u",
         f"#define CLVOL_PEAKS {1 + weight}",
         f"#define BLACKBODY_BINS {BINS}",
         f"#define BLACKBODY_MIDDLE {MIDDLE_KELVIN}f",

@@ -117,6 +117,19 @@ def geometry_headers(config: KernelConfig, stage: str) -> list[str]:
     return headers
 
 
+def shade_headers(config: KernelConfig) -> list[str]:
+    """Headers of the events that shade handles."""
+    features = config.features
+    found = {
+        "stages/escape.h": features.constant or features.envmap,
+        "stages/bounce.h": features.surfaces or features.scattering,
+        "stages/first_hit.h": bool(config.first_hit),
+        "stages/surface_scatter.h": features.surfaces > 0,
+        "stages/collision_scatter.h": features.media > 0,
+    }
+    return [name for name, needed in found.items() if needed]
+
+
 def bsdf_headers(kinds: tuple[str, ...]) -> list[str]:
     """Headers of the BSDFs that a scene uses, and the one that chooses among them."""
     return [BSDF_HEADERS[kind] for kind in kinds if kind in BSDF_HEADERS] + ["bsdf/bsdf.h"]
@@ -147,6 +160,8 @@ def compose(config: KernelConfig, headers: list[str], body: str) -> str:
 def stage_source(config: KernelConfig, stage: str) -> str:
     """The composed source of one stage kernel, or of `accumulate`."""
     headers = [] if stage == "accumulate" else [*stage_headers(config, stage), "stages/path.h"]
+    if stage == "shade":
+        headers += shade_headers(config)
     return compose(config, headers, f'#include "kernels/{stage}.cl"\n')
 
 

@@ -103,15 +103,17 @@ class Wavefront:
             "control": 4 * (_DONE + self.pool.ring_passes),
             "results": 4 * self.config.channels * ring_jobs // self.config.jobs_per_sample,
             **({"result_firsts": 4 * len(self.firsts) * ring_jobs} if self.firsts else {}),
-            "result_counts": 4 * (len(self.path_counts) + self.peaks - 1) * ring_jobs,
         }
+        if stride := layout.counts_per_path(self.config):
+            sizes["result_counts"] = 4 * stride * ring_jobs
         self.buffers = {name: self._buffer(size) for name, size in sizes.items()} | scene_buffers
         self.bytes = sum(sizes.values()) + sum(b.size for b in scene_buffers.values())
         film_sizes = {
             "film": 16 * self.config.channels * self.pixels,
-            "film_counts": 8 * len(self.path_counts) * self.pixels,
             "film_peaks": 4 * self.peaks * self.pixels,
         }
+        if self.path_counts:
+            film_sizes["film_counts"] = 8 * len(self.path_counts) * self.pixels
         if self.firsts:
             film_sizes["film_firsts"] = 8 * len(self.firsts) * self.pixels
         self.film = {name: self._buffer(size) for name, size in film_sizes.items()}
@@ -249,8 +251,9 @@ class Wavefront:
             (-(-self.pixels // local) * local,),
             (local,),
             self.buffers["results"],
-            self.buffers["result_counts"],
-            *(self.film[name] for name in ("film", "film_counts", "film_peaks")),
+            *(self.film[name] for name in ("film", "film_peaks")),
+            *((self.buffers["result_counts"],) if "result_counts" in self.buffers else ()),
+            *((self.film["film_counts"],) if self.path_counts else ()),
             *((self.buffers["result_firsts"], self.film["film_firsts"]) if self.firsts else ()),
             self.buffers["control"],
             np.uint32(ring_pass),
@@ -275,6 +278,8 @@ class Wavefront:
 
     def counts(self) -> dict[str, np.ndarray]:
         """What walks counted so far, by name, uint64 (pixels,)."""
+        if not self.path_counts:
+            return {}
         counts = self._film("film_counts", (self.pixels, len(self.path_counts)), np.uint64)
         return {name: counts[:, n] for n, name in enumerate(self.path_counts)}
 

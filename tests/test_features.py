@@ -149,7 +149,7 @@ def test_homogeneous_scenes_hold_no_grid_code_and_no_grid_buffers(device, name):
         f for f in files if f.startswith(("density/", "majorant/", "tracking/delta", "tracking/ratio"))
     ]
     assert not argument_names(config) & {"volumes", "tops", "bricks", "majorants", "kd_nodes"}
-    assert not field_names(config) & {"violations", "exhausted"}
+    assert not field_names(config) & {"lookups", "violations", "exhausted"}
     for stage, text in units(config).items():
         for word in (
             "majorant_next",
@@ -300,15 +300,20 @@ SURFACE_CODE = (
     "geometry/quadric",
     "bsdf/",
     "texture/",
+    "stages/surface_scatter",
+    "stages/hit",
+    "stages/side",
 )
 MEDIUM_CODE = (
     "tracking/d",
     "tracking/h",
+    "tracking/p",
     "density/",
     "majorant/",
     "phase/",
     "stages/medium",
     "stages/stretch",
+    "stages/collision_scatter",
 )
 PLAIN = replace(ball((0.5, 0.5, 0.5), 0.4), bsdf=Diffuse())
 
@@ -331,7 +336,26 @@ def test_scenes_without_media_hold_no_tracking_code(device):
     config = config_of(device, scene([PLAIN], [SKY, LAMP]))
     assert not held(config, MEDIUM_CODE) and "medium_sample" not in config.stages
     assert not argument_names(config) & {"media", "phases", "volumes", "bricks", "majorants"}
-    assert not field_names(config) & {"medium", "interval_end"}
+    assert not field_names(config) & {
+        "medium",
+        "interval_end",
+        "lookups",
+        "tentative",
+        "real",
+        "largest_weight",
+    }
+    assert not argument_names(config) & {"result_counts"}
+
+
+def test_what_shade_handles_comes_with_what_paths_can_meet(device):
+    for name, events in {
+        "nothing": set(),
+        "a sky": {"escape"},
+        "absorbing fog": {"escape", "collision_scatter"},
+        "fog under a sun": {"bounce", "collision_scatter"},
+    }.items():
+        found = held(config_of(device, SCENES[name]), ("stages/escape", "stages/bounce", "stages/collision"))
+        assert found == {f"stages/{event}.h" for event in events}, name
 
 
 @pytest.mark.parametrize(

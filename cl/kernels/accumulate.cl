@@ -14,8 +14,13 @@ INLINE float2 add_exactly(float2 sum, float value)
     return (float2)(total, sum.y + lost);
 }
 
-__kernel void accumulate_kernel(__global const float *results, __global const uint *result_counts,
-                                __global float *film, __global ulong *film_counts, __global float *film_peaks,
+__kernel void accumulate_kernel(__global const float *results, __global float *film, __global float *film_peaks,
+#if CLVOL_RESULT_COUNTS
+                                __global const uint *result_counts,
+#endif
+#if CLVOL_PATH_COUNTS
+                                __global ulong *film_counts,
+#endif
 #if CLVOL_FIRST_HIT
                                 __global const float *result_firsts, __global float *film_firsts,
 #endif
@@ -27,12 +32,14 @@ __kernel void accumulate_kernel(__global const float *results, __global const ui
     const uint jobs = samples * CLVOL_JOBS_PER_SAMPLE; /* of the pixel */
     const size_t first_job = (size_t)ring_pass * pass_jobs + (size_t)pixel * jobs;
     const size_t first = first_job / CLVOL_JOBS_PER_SAMPLE;
+#if CLVOL_PATH_COUNTS
     for (uint n = 0; n < CLVOL_PATH_COUNTS; ++n) {
         ulong total = 0;
         for (uint job = 0; job < jobs; ++job)
             total += result_counts[(first_job + job) * CLVOL_RESULT_COUNTS + n];
         film_counts[(size_t)pixel * CLVOL_PATH_COUNTS + n] += total;
     }
+#endif
     float peak = film_peaks[(size_t)pixel * CLVOL_PEAKS];
     for (uint c = 0; c < CLVOL_CHANNELS; ++c) {
         const size_t at = (size_t)pixel * CLVOL_CHANNELS + c;

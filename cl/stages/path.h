@@ -157,10 +157,10 @@ INLINE void reset_path(const Scene *scene, uint slot)
 #if CLVOL_HAS_MEDIA
 INLINE void record_tally(const Scene *scene, uint slot, Tally tally)
 {
-    set_path_lookups(scene, slot, path_lookups(scene, slot) + tally.lookups);
     set_path_tentative(scene, slot, path_tentative(scene, slot) + tally.tentative);
     set_path_real(scene, slot, path_real(scene, slot) + tally.real);
 #if CLVOL_HAS_HETEROGENEOUS
+    set_path_lookups(scene, slot, path_lookups(scene, slot) + tally.lookups);
     set_path_cells(scene, slot, path_cells(scene, slot) + tally.cells);
     if (tally.violations > 0)
         set_path_violations(scene, slot, path_violations(scene, slot) + tally.violations);

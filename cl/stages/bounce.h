@@ -1,0 +1,38 @@
+/* What scatterings at surfaces and in media have in common: the depth they may reach, and shadow rays. */
+#ifndef CLVOL_STAGES_BOUNCE_H
+#define CLVOL_STAGES_BOUNCE_H
+
+/* Whether the scattering numbered `bounce` is one too many; what it would have carried on is counted. */
+INLINE bool depth_is_reached(const Scene *scene, uint slot, uint bounce, Spectrum beta)
+{
+#if CLVOL_HAS_MAX_DEPTH
+    if (bounce >= scene->render->max_depth) {
+        set_path_cut(scene, slot, path_cut(scene, slot) + 1);
+        set_path_cut_energy(scene, slot, path_cut_energy(scene, slot) + spectrum_mean(beta));
+        return true;
+    }
+#endif
+    return false;
+}
+
+#if CLVOL_NEE
+/* Queues a shadow ray that brings `value` along if nothing is in its way. */
+INLINE void queue_shadow(const Scene *scene, uint group, uint slot, float3 from, const LightSample *light, Spectrum value)
+{
+    set_path_shadow_x(scene, slot, light->direction.x);
+    set_path_shadow_y(scene, slot, light->direction.y);
+    set_path_shadow_z(scene, slot, light->direction.z);
+#if CLVOL_HAS_POINT || CLVOL_HAS_SPOT || CLVOL_HAS_AREA
+    set_path_shadow_distance(scene, slot, light->distance);
+#endif
+#if CLVOL_HAS_SURFACES
+    set_path_shadow_origin_x(scene, slot, from.x);
+    set_path_shadow_origin_y(scene, slot, from.y);
+    set_path_shadow_origin_z(scene, slot, from.z);
+#endif
+    set_shadow(scene, slot, value);
+    queue_push(scene, group, QUEUE_SHADOW, slot);
+}
+#endif
+
+#endif
