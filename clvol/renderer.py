@@ -5,12 +5,11 @@ from __future__ import annotations
 import operator
 import signal
 import threading
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 
 from clvol import registry
-from clvol.choices import Choices, prepare_for
+from clvol.choices import Choices
 from clvol.device import open_device
 from clvol.errors import OptionError
 from clvol.progress import ProgressCallback, RichProgress
@@ -85,19 +84,13 @@ def render(
     choices = Choices(**names, majorant_scale=majorant_scale, step=step, aov=aov)
     first, count = _sample_range(scene, spp, time_limit, samples)
     seed = scene.seed if seed is None else seed
-    if not 0 <= seed < 2**64:
-        raise OptionError(f"seed {seed} is not a 64-bit number", hint="choose one from 0 to 2**64 - 1")
-    started = time.perf_counter()
-    opened = open_device(device)
-    prepared = prepare_for(scene, choices)
-    session = Session.open(opened, prepared, choices, seed, pool)
+    session = Session.for_scene(open_device(device), scene, choices, seed, pool)
     session.describe()
     session.warn_of_unused(asked)
-    setup_seconds = time.perf_counter() - started
     bar = RichProgress() if progress is True else nullcontext(progress or None)
     with bar as callback, _interrupt_flag() as interrupted:
         done = session.run(first, count, time_limit, callback, interrupted)
-    result = session.result(first, done, setup_seconds)
+    result = session.result(first, done)
     result.stats["interrupted"] = bool(interrupted())
     return result
 

@@ -11,15 +11,17 @@ import numpy as np
 
 from clvol import layout, registry
 from clvol.camera import camera_rays
-from clvol.choices import Choices, resolve
+from clvol.choices import Choices, prepare_for, resolve
 from clvol.config import KernelConfig
 from clvol.device import Device
+from clvol.errors import OptionError
 from clvol.film import FILTER_BINS
 from clvol.prepare import PreparedScene
 from clvol.programs import build_stages
 from clvol.progress import Progress, ProgressCallback
 from clvol.result import Result, mean_and_variance, relative_noise
 from clvol.scene.digest import scene_digest
+from clvol.scene.records import Scene
 from clvol.upload import upload_scene
 from clvol.version import __version__
 from clvol.wavefront import Pool, Progressed, Wavefront
@@ -43,19 +45,46 @@ class Session:
     wavefront: Wavefront
     seed: int
     step: float | None = None
+    setup_seconds: float = 0.0
+    """From the scene's records to buffers and kernels."""
+    kernel_seconds: float = 0.0
+    """The part of it that went into building kernels, nothing where a cache has them."""
+
+    @classmethod
+    def for_scene(
+        cls, device: Device, scene: Scene, choices: Choices, seed: int, pool: int | None = None
+    ) -> Session:
+        """Prepare a scene for `choices` and open it."""
+        seed_words(seed)
+        started = time.perf_counter()
+        prepared = prepare_for(scene, choices)
+        prepared_after = time.perf_counter() - started
+        session = cls.open(device, prepared, choices, seed, pool)
+        session.setup_seconds += prepared_after
+        return session
 
     @classmethod
     def open(
         cls, device: Device, prepared: PreparedScene, choices: Choices, seed: int, pool: int | None = None
     ) -> Session:
         """Compose and build the kernels, upload the scene, allocate the pool."""
+        started = time.perf_counter()
         config = kernel_config(prepared, choices, device)
         kernels = build_stages(device, config)
+        built = time.perf_counter()
         buffers = upload_scene(device, prepared, config, choices.step)
         record = render_record(prepared, seed)
         wavefront = Wavefront(device, config, kernels, buffers, record, Pool.for_device(device, config, pool))
+        warming = time.perf_counter()
         wavefront.warm_up()
-        return cls(device, prepared, config, wavefront, seed, choices.step)
+        ready = time.perf_counter()
+        kernel_seconds = built - started + ready - warming
+        return cls(device, prepared, config, wavefront, seed, choices.step, ready - started, kernel_seconds)
+
+    def restart(self, seed: int) -> None:
+        """Forget the picture; the next run draws another seed's samples, with the same kernels and buffers."""
+        self.seed = seed
+        self.wavefront.restart(seed_words(seed))
 
     def describe(self) -> None:
         """Log what was found and built."""
@@ -154,12 +183,12 @@ class Session:
     def _noise(self, count: int) -> float:
         return relative_noise(*mean_and_variance(*self.wavefront.sums(), count))
 
-    def result(self, first: int, count: int, setup_seconds: float) -> Result:
+    def result(self, first: int, count: int) -> Result:
         """The film as a Result, with what it cost."""
         film = self.prepared.scene.film
         shape = film.window[3], film.window[2]
         sums = [np.broadcast_to(s, (len(s), 3)).reshape(*shape, 3).copy() for s in self.wavefront.sums()]
-        stats = self._statistics(count, setup_seconds)
+        stats = self._statistics(count)
         metadata = {
             "scene": self.prepared.scene.source,
             "digest": scene_digest(self.prepared.scene),
@@ -204,7 +233,7 @@ class Session:
             means += sums["met"][:, None] / paths * self.prepared.centre
         return means if channels > 1 else means[:, 0]
 
-    def _statistics(self, count: int, setup_seconds: float) -> dict:
+    def _statistics(self, count: int) -> dict:
         wavefront = self.wavefront
         slots = wavefront.slot_statistics()
         peaks = {n: float(p.max(initial=0.0)) for n, p in wavefront.peaks_by_pixel().items()}
@@ -218,7 +247,12 @@ class Session:
             "null_collisions": counts["tentative"] - counts["real"],
             "real_collisions": counts["real"],
             "cells_crossed": counts["cells"],
-            "seconds": {"setup": setup_seconds, "render": self.seconds, **wavefront.seconds},
+            "seconds": {
+                "setup": self.setup_seconds,
+                "kernels": self.kernel_seconds,
+                "render": self.seconds,
+                **wavefront.seconds,
+            },
             "launches": wavefront.launches,
             "waves": wavefront.waves,
             "slots": wavefront.pool.slots,
@@ -255,7 +289,11 @@ class Session:
                 "use probability history, or a technique without weights",
                 stats["largest_weight"],
             )
-        log.info("set-up (kernels, volumes, majorants) %8.3f seconds", setup_seconds)
+        log.info(
+            "set-up (volumes, majorants, kernels)  %8.3f seconds, %.3f of them for kernels",
+            self.setup_seconds,
+            self.kernel_seconds,
+        )
         for stage, seconds in wavefront.seconds.items():
             log.info("stage %-20s %8.3f seconds", stage, seconds)
         return stats
@@ -270,12 +308,19 @@ def kernel_config(prepared: PreparedScene, choices: Choices, device: Device) -> 
     return KernelConfig(prepared.features, majorant=prepared.majorant, aov=choices.aov, **resolved, **tuning)
 
 
+def seed_words(seed: int) -> tuple[int, int]:
+    """A 64-bit seed as the device takes it: low word, high word."""
+    if not 0 <= seed < 2**64:
+        raise OptionError(f"seed {seed} is not a 64-bit number", hint="choose one from 0 to 2**64 - 1")
+    return seed & 0xFFFFFFFF, seed >> 32
+
+
 def render_record(prepared: PreparedScene, seed: int) -> np.ndarray:
     """The Render record, schedule fields left at 0."""
     scene = prepared.scene
     record = np.zeros(1, layout.RENDER)
     record["film_size"] = scene.film.window[2:]
-    record["seed"] = seed & 0xFFFFFFFF, seed >> 32
+    record["seed"] = seed_words(seed)
     record["max_depth"] = scene.integrator.max_depth & 0xFFFFFFFF
     record["rr_depth"] = scene.integrator.rr_depth
     record["emitters"] = prepared.features.emitters

@@ -117,8 +117,7 @@ class Wavefront:
         if self.firsts:
             film_sizes["film_firsts"] = 8 * len(self.firsts) * self.pixels
         self.film = {name: self._buffer(size) for name, size in film_sizes.items()}
-        for name, size in film_sizes.items():
-            cl.enqueue_fill_buffer(self.device.queue, self.film[name], np.uint32(0), 0, size)
+        self._clear_film()
         state = np.zeros((len(self.fields), self.stride), np.uint32)
         state[[f.name for f in self.fields].index("job")] = NO_JOB
         self._write("state", state)
@@ -129,6 +128,23 @@ class Wavefront:
         ]
         for stage in self.config.stages:
             self.kernels[stage].set_args(*values)
+
+    def _clear_film(self) -> None:
+        for buffer in self.film.values():
+            cl.enqueue_fill_buffer(self.device.queue, buffer, np.uint32(0), 0, buffer.size)
+
+    def restart(self, seed: tuple[int, int]) -> None:
+        """Forget every sample and what was counted; the next run draws the random numbers of another seed."""
+        self._harvest()
+        self._clear_film()
+        self._write("control", np.zeros(_DONE + self.pool.ring_passes, np.uint32))
+        self.render["seed"] = seed
+        self.slot_totals = dict.fromkeys(self.slot_totals, 0.0)
+        self._reset_clocks()
+
+    def _reset_clocks(self) -> None:
+        self.seconds = dict.fromkeys(self.seconds, 0.0)
+        self.launches = self.waves = 0
 
     def _buffer(self, size: int) -> cl.Buffer:
         return self.device.allocate(size, f"a film of {self.pixels} pixels", "render fewer pixels")
@@ -204,8 +220,7 @@ class Wavefront:
         self._start_round(0, self.pass_samples * self.sample_jobs, 0, self.pass_samples)
         self._launch(1)
         self._accumulate(0, 0)
-        self.seconds = dict.fromkeys(self.seconds, 0.0)
-        self.launches = self.waves = 0
+        self._reset_clocks()
 
     def _start_round(self, first: int, pass_jobs: int, last_pass: int, last_samples: int) -> None:
         self.render["first_sample"], self.render["pass_samples"] = first, self.pass_samples

@@ -23,7 +23,7 @@ def timed_render(opened: OpenScene, spp: int, seed: int) -> tuple[Result, float,
     session = opened.session(seed)
     wall, cpu = time.perf_counter(), time.process_time()
     done = session.run(0, spp, None, None, lambda: False)
-    result = session.result(0, done, 0.0)
+    result = session.result(0, done)
     return result, time.process_time() - cpu, time.perf_counter() - wall
 
 

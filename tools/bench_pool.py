@@ -17,10 +17,14 @@ def measure_pool(opened: OpenScene, sizes: list[int], spp: int, rounds: int) -> 
         for size in sizes:
             session = opened.session(0, size)
             done = session.run(0, spp, None, None, lambda: False)
-            runs[size].append(session.result(0, done, 0.0).stats)
+            runs[size].append(session.result(0, done).stats)
     figures: Figures = {}
     for size, stats in runs.items():
-        stages = {k: spread([s["seconds"][k] for s in stats]) for k in stats[0]["seconds"] if k != "setup"}
+        stages = {
+            k: spread([s["seconds"][k] for s in stats])
+            for k in stats[0]["seconds"]
+            if k not in ("setup", "kernels")
+        }
         same = {k: stats[0][k] for k in ("paths", "slots", "bytes_per_slot")}
         launches = spread([s["launches"] for s in stats])
         figures[str(size)] = same | {"seconds": stages, "launches": launches}

@@ -18,7 +18,7 @@ def stage_seconds(scene: str, res: int, choices: dict[str, str], device: str | N
     opened.session(0).run(0, 1, None, None, lambda: False)
     session = opened.session(1)
     done = session.run(0, 16, None, None, lambda: False)
-    stats = session.result(0, done, 0.0).stats["seconds"]
+    stats = session.result(0, done).stats["seconds"]
     return {stage: stats[stage] for stage in opened.config().stages}
 
 

@@ -44,7 +44,7 @@ def timed(device, scene: Scene, choices: Choices, spp: int, seed: int):
     started = time.process_time()
     done = session.run(0, spp, None, None, lambda: False)
     cpu = time.process_time() - started
-    return session.result(0, done, 0.0), cpu
+    return session.result(0, done), cpu
 
 
 @click.command()

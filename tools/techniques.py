@@ -63,7 +63,7 @@ class Row:
         started = time.process_time()
         done = session.run(0, spp, None, None, lambda: False)
         cpu = time.process_time() - started
-        result = session.result(0, done, 0.0)
+        result = session.result(0, done)
         self.images.append(result.image)
         self.cpu.append(cpu)
         self.lookups = result.stats["lookups"] / (result.image[..., 0].size * spp)
