@@ -82,7 +82,7 @@ class Session:
         return cls(device, prepared, config, wavefront, seed, choices.step, ready - started, kernel_seconds)
 
     def restart(self, seed: int) -> None:
-        """Forget the picture; the next run draws another seed's samples, with the same kernels and buffers."""
+        """Forget the picture; the next run draws another seed's samples with the same kernels and buffers."""
         self.seed = seed
         self.wavefront.restart(seed_words(seed))
 

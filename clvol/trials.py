@@ -1,8 +1,8 @@
-"""Combinations of choices, each opened once and rendered again and again: what compare, selftest and the pilot
-measure with.
+"""Combinations of choices, each opened once and rendered again and again: what comparisons, self-tests and
+pilots measure with.
 
-Rounds of different seeds are independent.  Seconds are those of the render alone; what came before it, once, is
-kept apart: precomputation (volumes, majorants, trees), which counts, and kernel builds, which do not.
+Rounds of different seeds are independent.  Seconds are those of the render alone; what came before it, once,
+is kept apart: precomputation (volumes, majorants, trees), which counts, and kernel builds, which do not.
 """
 
 from __future__ import annotations
@@ -49,7 +49,12 @@ class Trial:
     @property
     def options(self) -> str:
         """The options of `clvol render` that repeat it, without those it has no use for."""
-        used = {family: name for family, name in self.names.items() if name in FAMILIES[family]}
+        config = self.session.config
+        used = {
+            family: name
+            for family, name in self.names.items()
+            if name in FAMILIES[family] and name == getattr(config, family)
+        }
         return " ".join(f"--{family} {name}" for family, name in used.items())
 
     def render(self, seed: int, spp: int) -> Result:
@@ -60,8 +65,8 @@ class Trial:
 
 
 def rounds(trials: list[Trial], spp: list[int], seeds: Iterator[int]) -> Iterator[list[Result]]:
-    """Rounds in which every trial renders once, each with a seed of its own; the order turns from round to round,
-    so that no trial always runs after the same one."""
+    """Rounds in which every trial renders once, each with a seed of its own; the order turns from round to
+    round, so that no trial always begins."""
     turn = 0
     while True:
         results: list[Result | None] = [None] * len(trials)
