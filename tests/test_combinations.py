@@ -29,19 +29,21 @@ def linear(technique, transmittance):
 
 
 def covering_set():
-    """Every technique with every transmittance; the rest by residues, so that few kernels are built."""
+    """Every technique with every transmittance; the rest by residues, so that few kernels are built: three or
+    four of each technique, three or four of each transmittance."""
     chosen = []
     for (i, technique), (j, transmittance) in itertools.product(
         enumerate(TECHNIQUES), enumerate(TRANSMITTANCES)
     ):
-        stochastic = (i + j) % 3 == (i // 2) % 3 and linear(technique, transmittance)
+        k = (i + j) % 3
+        stochastic = k == 2 * i % 3 and linear(technique, transmittance)
         chosen.append(
             (
                 technique,
                 transmittance,
-                MAJORANTS[(i + j) % 3],
+                MAJORANTS[k],
                 "stochastic" if stochastic else "exact",
-                ABSORPTIONS[(i // 2 + j // 2) % 3],
+                ABSORPTIONS[(k + i // 3) % 3],
             )
         )
     return chosen

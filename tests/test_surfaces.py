@@ -74,7 +74,7 @@ def test_a_furnace_found_by_its_paths_is_one_in_every_sample(name):
 
 @pytest.mark.parametrize("name", ["white sphere", "milk round a white sphere, in a mesh", "mask"])
 def test_a_furnace_with_light_sampling_is_one(name):
-    assert_matches(show(sampled(FURNACES[name]), spp=1 << 14, seed=2), 1.0, bias=0.01)
+    assert_matches(show(sampled(FURNACES[name]), spp=1 << 14, seed=2), 1.0)
 
 
 def test_in_glass_no_light_can_be_sampled_and_every_path_weighs_one():
@@ -82,11 +82,19 @@ def test_in_glass_no_light_can_be_sampled_and_every_path_weighs_one():
     assert np.abs(result.image - 1).max() < 1e-4
 
 
-@pytest.mark.parametrize("medium", [None, MILK], ids=["clear", "milky"])
-def test_rough_glass_loses_only_what_scatters_twice_at_its_facets(medium):
+@pytest.mark.parametrize(
+    "medium, known, uncertain",
+    [(None, 0.98109, 0.00009), (MILK, 0.94195, 0.00023)],
+    ids=["clear", "milky"],
+)
+def test_rough_glass_loses_what_scatters_twice_at_its_facets(medium, known, uncertain):
+    """Mean of the picture and its standard error as Mitsuba 3.9.1 has them: volpath, scalar_rgb, without
+    roulette, 8 renders of 8192 samples a pixel."""
     shape = surfaced(ball((0, 0, 0), 1.0, medium), RoughDielectric(1.5, 1.0, "ggx", 0.1, 0.1))
-    mean, error = mean_and_error(show(found([shape], fov=14.0), spp=1 << 12))
-    assert mean[0] - 4 * error[0] > (0.96 if medium is None else 0.93) and mean[0] < 1 + 4 * error[0]
+    mean, error = mean_and_error(show(found([shape], fov=14.0), spp=3 << 12))
+    error = np.hypot(error[0], uncertain)
+    assert abs(mean[0] - known) < largest_z(1) * error, f"{mean[0]:.5f} ± {error:.5f}"
+    assert 2 * largest_z(1) * error < 0.005 * known
 
 
 def test_a_half_space_behind_smooth_glass_reflects_what_giovanelli_says():
@@ -94,9 +102,9 @@ def test_a_half_space_behind_smooth_glass_reflects_what_giovanelli_says():
     reciprocity, what is seen along the normal under a uniform sky; nothing gets through the slab."""
     slab = surfaced(box((-300, -300, 0), (300, 300, 40.0), homogeneous(1.0, 0.9)), GLASS)
     scene = found([slab], eye=(0.1, 0.2, -5.0), target=(0.1, 0.2, 0.0), fov=0.01, size=(2, 2))
-    result = show(scene, spp=1 << 16, seed=3)
+    result = show(scene, spp=3 << 18, seed=3)
     mean, error = mean_and_error(result)
-    assert error[0] < 0.0012
+    assert 1.4 * largest_z(1) * error[0] < 0.005 * 0.2600
     assert abs(z_score(mean[0], error[0] ** 2, 0.2600)) < largest_z(1), f"{mean[0]:.4f} ± {error[0]:.4f}"
 
 
@@ -111,6 +119,11 @@ def floor_points(scene, nodes=4):
     o, d, w = camera_rays(scene, nodes)
     t = -o[1] / d[..., 1]
     return o + t[..., None] * d, t, w
+
+
+def near(scene):
+    """Distance of the near plane along rays of the middle of the picture, which is narrow."""
+    return scene.sensor.near_clip
 
 
 def lamp_irradiance(points, height, half, sigma=0.0, nodes=24):
@@ -151,16 +164,18 @@ def test_a_square_lamp_lights_a_floor_through_what_lets_light_pass(name):
     scene = floor_scene([lamp(), *shapes], **view)
     points, _, w = floor_points(scene)
     answer = (0.6 / np.pi * 2.0 * share * lamp_irradiance(points, 1.5, 0.5)) @ w
-    assert_matches(show(scene, spp=1 << 14, seed=4), answer[..., None], bias=0.01)
+    assert_matches(show(scene, spp=1 << 13, seed=4), answer[..., None])
 
 
 def test_a_square_lamp_in_an_absorbing_room_is_dimmed_on_both_ways():
+    """The camera's rays start at the near plane."""
     sigma = 0.4
     room = mesh_box((-30, -30, -30), (30, 30, 30), homogeneous(sigma, 0.0))
-    scene = floor_scene([lamp(), room])
+    scene = floor_scene([lamp(), room], eye=(0.4, 0.5, -0.7))
     points, t, w = floor_points(scene)
+    t = t - near(scene)
     answer = (0.6 / np.pi * 2.0 * lamp_irradiance(points, 1.5, 0.5, sigma) * np.exp(-sigma * t)) @ w
-    assert_matches(show(scene, spp=1 << 15, seed=5), answer[..., None], bias=0.015)
+    assert_matches(show(scene, spp=1 << 16, seed=5), answer[..., None])
 
 
 def test_a_spherical_lamp_lights_a_floor_as_its_closed_form():
@@ -171,7 +186,7 @@ def test_a_spherical_lamp_lights_a_floor_as_its_closed_form():
     to = centre - points
     square = (to**2).sum(-1)
     answer = (0.6 / np.pi * np.pi * 2.0 * radius**2 * to[..., 1] / square**1.5) @ w
-    assert_matches(show(scene, spp=1 << 14, seed=6), answer[..., None], bias=0.01)
+    assert_matches(show(scene, spp=1 << 13, seed=6), answer[..., None])
 
 
 def test_a_point_light_through_a_pane_and_round_an_opaque_sphere():
@@ -190,7 +205,7 @@ def test_a_point_light_through_a_pane_and_round_an_opaque_sphere():
     s = ((1.5 * cosine - inner) / (1.5 * cosine + inner)) ** 2
     reflected = (r + s) / 2
     answer = (0.6 / np.pi * 3.0 * cosine / square * (1 - reflected) / (1 + reflected)) @ w
-    assert_matches(show(scene, spp=1 << 10, seed=7), answer[..., None], bias=0.01)
+    assert_matches(show(scene, spp=1 << 10, seed=7), answer[..., None])
     shaded = floor_scene(
         [surfaced(ball((0.2, 0.8, 0.1), 0.3), WHITE)],
         (DARK, light),
@@ -212,7 +227,7 @@ def test_a_spot_in_fog_scatters_once_as_its_quadrature():
     eye = (0.1, 0.2, -5.0)
     scene = sampled([room], (DARK, light), eye=eye, target=(0.1, 0.0, 0.0), fov=10.0, max_depth=2)
     o, d, w = camera_rays(scene, 3)
-    t, dt = gauss(0.0, 11.0 / d[..., 2], 64)
+    t, dt = gauss(near(scene), 11.0 / d[..., 2], 64)
     x = o + t[..., None] * d[..., None, :]
     to = place - x
     far = np.linalg.norm(to, axis=-1)
@@ -222,12 +237,13 @@ def test_a_spot_in_fog_scatters_once_as_its_quadrature():
     beam = np.clip((80.0 - angle) / 1.0, 0.0, 1.0)
     cosine = (to * d[..., None, :]).sum(-1)
     phase = (1 - g * g) / (4 * np.pi * (1 + g * g - 2 * g * cosine) ** 1.5)
-    source = sigma * albedo * np.exp(-sigma * (t + far)) * phase * 5.0 * beam / far**2
+    source = sigma * albedo * np.exp(-sigma * (t - near(scene) + far)) * phase * 5.0 * beam / far**2
     answer = ((source * dt).sum(-1) @ w)[..., None]
-    assert_matches(show(scene, spp=1 << 15, seed=8), answer, bias=0.015)
+    assert_matches(show(scene, spp=1 << 15, seed=8), answer)
 
 
 def test_paths_that_find_lamps_and_paths_that_sample_them_see_one_picture():
+    """A bias of 1 % of either would be seen."""
     shapes = [
         FLOOR,
         lamp(1.5, 0.8),
@@ -237,11 +253,11 @@ def test_paths_that_find_lamps_and_paths_that_sample_them_see_one_picture():
     ]
     view = EYE | {"fov": 40.0, "size": (8, 8)}
     lights = (replace(SKY, radiance=(0.2,)),)
-    a = show(sampled(shapes, lights, **view), spp=1 << 12, seed=9)
-    b = show(found(shapes, lights, **view), spp=1 << 13, seed=10)
+    a = show(sampled(shapes, lights, **view), spp=1 << 14, seed=9)
+    b = show(found(shapes, lights, **view), spp=1 << 14, seed=10)
     assert_same_picture(a, b, tile=4)
     (mean, variance), (_, other) = image_mean(a), image_mean(b)
-    assert (4.2 * np.sqrt(variance + other) < 0.02 * mean).all()
+    assert (4.2 * np.sqrt(variance + other) < 0.01 * mean).all()
 
 
 # -- depth and roulette ------------------------------------------------------------------------------
@@ -270,10 +286,10 @@ def test_roulette_in_glass_leaves_the_picture_as_it_is():
     results = []
     for rr_depth, seed in ((1, 12), (10_000, 13)):
         scene = found([surfaced(ball((0, 0, 0), 1.0, absorbing), GLASS)], fov=20.0, rr_depth=rr_depth)
-        results.append(show(scene, spp=1 << 13, seed=seed))
+        results.append(show(scene, spp=3 << 14, seed=seed))
     assert_same_picture(*results, tile=1)
     (mean, variance), (_, other) = (image_mean(r) for r in results)
-    assert (4.2 * np.sqrt(variance + other) < 0.02 * mean).all()
+    assert (4.2 * np.sqrt(variance + other) < 0.005 * mean).all()
 
 
 # -- hostile views -----------------------------------------------------------------------------------
@@ -307,6 +323,6 @@ def test_a_scene_far_from_the_origin_is_the_scene_at_the_origin():
         sensor=replace(here.sensor, to_world=to_world),
         shapes=tuple(moved(s, far) for s in here.shapes),
     )
-    a, b = show(here, spp=1 << 11, seed=14), show(there, spp=1 << 11, seed=15)
+    a, b = show(here, spp=1 << 12, seed=14), show(there, spp=1 << 12, seed=15)
     assert a.stats["non_finite"] == b.stats["non_finite"] == 0
     assert_same_picture(a, b, tile=4)
