@@ -23,8 +23,8 @@ class Choices:
 
     Parameters
     ----------
-    technique, transmittance, majorant, lookup, absorption, probability, control : names of `clvol.registry`,
-        or "auto".
+    technique, transmittance, majorant, lookup, absorption, probability, control, sampler : names of
+        `clvol.registry`, or "auto".
     majorant_scale : multiplies every bound, for experiments.
     step : world length of a marching step; None takes the edge of a voxel.
     aov : names of `registry.AOVS` to return as pictures; look-ups always are.
@@ -37,6 +37,7 @@ class Choices:
     absorption: str = "auto"
     probability: str = "auto"
     control: str = "auto"
+    sampler: str = "auto"
     majorant_scale: float = 1.0
     step: float | None = None
     aov: tuple[str, ...] = field(default=())
@@ -91,6 +92,9 @@ def prepare_for(scene: Scene, choices: Choices) -> PreparedScene:
     return prepared
 
 
+DEFAULT_SAMPLER = "sobol"
+
+
 def resolve(features: Features, asked: Mapping[str, str]) -> dict[str, str]:
     """Every family's choice but the majorant's, which `prepare` weighs by its cost; `auto` follows the rules
     that README states."""
@@ -101,6 +105,7 @@ def resolve(features: Features, asked: Mapping[str, str]) -> dict[str, str]:
         "absorption": "mixed",
         "probability": "history",
         "control": "mean",
+        "sampler": DEFAULT_SAMPLER,
     }
     return {family: asked[family] if asked[family] != "auto" else rule for family, rule in rules.items()}
 

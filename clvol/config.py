@@ -12,6 +12,7 @@ from clvol.accel.bvh import WIDTH
 from clvol.accel.bvh_split import MOST_DEPTH
 from clvol.features import Features
 from clvol.scene.materials import BSDFS
+from clvol.sobol import RANDOMIZATIONS
 
 BVH_STACK = (WIDTH - 1) * MOST_DEPTH + 1
 """Nodes that a traversal of the surfaces' hierarchy may keep waiting: siblings on every level."""
@@ -29,6 +30,7 @@ class KernelConfig:
     absorption: str = "sample"
     probability: str = "history"
     control: str = "mean"
+    sampler: str = "independent"
     aov: tuple[str, ...] = ()
     local_size: int = 1
     group_slots: int = 256
@@ -107,6 +109,11 @@ class KernelConfig:
         """Both ways of finding a light are in use, so that they must be weighted."""
         f = self.features
         return self.nee and (f.constant or f.envmap or f.area)
+
+    @property
+    def randomizations(self) -> int:
+        """Independent randomisations that the samples are dealt to; 0 where every sample is independent."""
+        return RANDOMIZATIONS if self.sampler == "sobol" else 0
 
     @property
     def first_hit(self) -> tuple[str, ...]:
@@ -189,6 +196,7 @@ class KernelConfig:
             "CLVOL_HAS_MAX_DEPTH": int(f.depth_limited),
             "CLVOL_HIDE_EMITTERS": int(f.hide_emitters),
             "CLVOL_FIRST_HIT": int(bool(self.first_hit)),
+            "CLVOL_RANDOMIZATIONS": self.randomizations,
             "CLVOL_NEE": int(self.nee),
             "CLVOL_MIS": int(self.mis),
             "CLVOL_ABSORPTION": tuple(registry.ABSORPTIONS).index(self.absorption),

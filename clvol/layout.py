@@ -381,6 +381,7 @@ def arguments(config: KernelConfig) -> list[Argument]:
         Argument("results", "__global float *"),
         Argument("result_counts", "__global uint *", counts_per_path(config) > 0),
         Argument("result_firsts", "__global float *", bool(config.first_hit)),
+        Argument("sobol", "__global const uint *", config.sampler == "sobol"),
         Argument("media", "__global const Medium *", features.media > 0),
         Argument("boundary_masks", "__global const uint *", features.boundaries > 0),
         Argument("volumes", "__global const Volume *", features.volumes > 0),

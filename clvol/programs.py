@@ -146,7 +146,7 @@ def compose(config: KernelConfig, headers: list[str], body: str) -> str:
     for name in ("core/types.h", "core/random.h"):
         lines += _expand(name, seen)
     lines += ['#line 1 "layout"', *layout.layout_text(config).splitlines()]
-    for name in headers:
+    for name in (registry.SAMPLERS[config.sampler].header, *headers):
         lines += _expand(name, seen)
     for line in body.splitlines():
         match = _INCLUDE.match(line)

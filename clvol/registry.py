@@ -134,6 +134,13 @@ CONTROLS = {
     "min": Choice("the least density of each majorant cell"),
     "max": Choice("the greatest density of each majorant cell"),
 }
+SAMPLERS = {
+    "independent": Choice("every number independent of all others", "core/independent.h"),
+    "sobol": Choice(
+        "an Owen-scrambled Sobol' sequence for each pixel: samples that cover every decision evenly",
+        "core/sobol.h",
+    ),
+}
 
 FAMILIES = {
     "technique": TECHNIQUES,
@@ -143,6 +150,7 @@ FAMILIES = {
     "absorption": ABSORPTIONS,
     "probability": PROBABILITIES,
     "control": CONTROLS,
+    "sampler": SAMPLERS,
 }
 FAMILY_PURPOSE = {
     "technique": "How collisions are sampled.",
@@ -152,6 +160,7 @@ FAMILY_PURPOSE = {
     "absorption": "How absorption is treated.",
     "probability": "How a spectral technique chooses events.",
     "control": "What residual-ratio subtracts.",
+    "sampler": "How the samples of a pixel are drawn.",
 }
 
 COUNTS = {

@@ -30,6 +30,7 @@ def render(
     absorption: str = "auto",
     probability: str = "auto",
     control: str = "auto",
+    sampler: str = "auto",
     majorant_scale: float = 1.0,
     step: float | None = None,
     aov: Sequence[str] = (),
@@ -45,7 +46,7 @@ def render(
     ----------
     scene : from `load_file` or `load_dict`.
     spp, seed : samples per pixel and 64-bit seed; default to the scene's.
-    technique, transmittance, majorant, lookup, absorption, probability, control : names from
+    technique, transmittance, majorant, lookup, absorption, probability, control, sampler : names from
         `clvol.registry`; "auto" takes the scene's own choice, else follows fixed rules, so that the same seed
         gives the same bits.
     majorant_scale : multiplies every bound of the density, for experiments; below 1 only for techniques and
@@ -79,6 +80,7 @@ def render(
         "absorption": absorption,
         "probability": probability,
         "control": control,
+        "sampler": sampler,
     }
     names = {family: _choice(scene, family, value) for family, value in asked.items()}
     choices = Choices(**names, majorant_scale=majorant_scale, step=step, aov=aov)

@@ -1,6 +1,7 @@
 """What a render returns: the picture, how sure of it we are, what it cost, and how it was made.
 
-A result keeps the float64 sums it is made from, so that results of disjoint samples merge without loss.
+A result keeps the float64 sums it is made from (`clvol.estimate`), so that results of disjoint samples merge
+without loss.
 """
 
 from __future__ import annotations
@@ -8,12 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from os import PathLike
 from typing import Any
 
 import numpy as np
 
 from clvol.errors import OptionError
+from clvol.estimate import Estimate, error_bias
 
 Ranges = tuple[tuple[int, int], ...]
 """Sample ranges as (first, count), ascending, disjoint, not touching."""
@@ -25,22 +28,10 @@ _LARGEST = ("largest", "peak", "bytes", "slots", "pool")
 """Statistics whose names begin so are maxima or sizes: merged by the maximum, not added."""
 
 
-def mean_and_variance(
-    sum_: np.ndarray, sum_of_squares: np.ndarray, count: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Mean of `count` samples and the variance of that mean, both float64 in the sums' shape.
-
-    The variance is (S2 - S1²/n) / (n (n - 1)), never below 0, and inf for a single sample: unknown.
-    """
-    mean = sum_ / count
-    if count < 2:
-        return mean, np.full_like(mean, np.inf)
-    spread = np.maximum(sum_of_squares - sum_ * mean, 0.0)
-    return mean, spread / (count * (count - 1.0))
-
-
-def relative_noise(image: np.ndarray, variance: np.ndarray) -> float:
+def relative_noise(image: np.ndarray, variance: np.ndarray, dof: float = math.inf) -> float:
     """Mean standard error of the pixels over their mean radiance; nan where that is unknown.
+
+    Standard errors from few degrees of freedom are too small on the mean, which is corrected.
 
     Both means run over the pixels and channels whose value and variance are finite, so that a dark
     background neither counts as infinitely noisy nor hides one bad pixel's nan.
@@ -49,7 +40,7 @@ def relative_noise(image: np.ndarray, variance: np.ndarray) -> float:
     level = float(np.abs(image[known]).sum(dtype=np.float64))
     if level == 0.0:
         return math.nan
-    return float(np.sqrt(variance[known]).sum(dtype=np.float64)) / level
+    return float(np.sqrt(variance[known]).sum(dtype=np.float64)) / level / error_bias(dof)
 
 
 @dataclass(eq=False)
@@ -61,7 +52,8 @@ class Result:
     image : float32 (height, width, 3)
         Mean linear radiance.
     variance : float32 (height, width, 3)
-        Variance of that mean, per pixel; inf after a single sample.
+        Variance of that mean, per pixel; inf after a single sample.  It has `dof` degrees of freedom: with
+        sampler sobol that of a single pixel is rough, sums over tiles and the image are good.
     stats : dict
         What it cost and what went wrong on the way: seconds by stage, paths, look-ups, violations, …
     aovs : dict of str to array (height, width) or (height, width, channels)
@@ -70,8 +62,8 @@ class Result:
         How the picture was made: scene, choices, spp, seed, device, version, seconds.
     samples : (int, int)
         First sample and number of samples of each pixel.
-    sum_, sum_of_squares : float64 (height, width, 3)
-        Sums over the samples, and over their squares.
+    estimate : `clvol.estimate.Moments` or `Replicates` of shape (height, width, 3)
+        Sums over the samples, by which results merge.
     ranges : tuple of (int, int)
         The same as `samples`, but exact where merged ranges leave gaps.
     """
@@ -82,18 +74,16 @@ class Result:
     aovs: dict[str, np.ndarray]
     metadata: dict[str, Any]
     samples: tuple[int, int]
-    sum_: np.ndarray
-    sum_of_squares: np.ndarray
+    estimate: Estimate
     ranges: Ranges = ()
 
     def __post_init__(self) -> None:
         self.ranges = self.ranges or (self.samples,)
 
     @classmethod
-    def from_sums(
+    def from_estimate(
         cls,
-        sum_: np.ndarray,
-        sum_of_squares: np.ndarray,
+        estimate: Estimate,
         samples: tuple[int, int],
         aovs: dict[str, np.ndarray],
         stats: dict[str, Any],
@@ -103,9 +93,7 @@ class Result:
         first, count = (int(number) for number in samples)
         if count < 1:
             raise OptionError("a result needs at least one sample per pixel")
-        sum_ = np.asarray(sum_, np.float64)
-        sum_of_squares = np.asarray(sum_of_squares, np.float64)
-        mean, variance = mean_and_variance(sum_, sum_of_squares, count)
+        mean, variance = estimate.mean_and_variance()
         return cls(
             image=mean.astype(np.float32),
             variance=variance.astype(np.float32),
@@ -113,8 +101,7 @@ class Result:
             aovs=aovs,
             metadata=metadata,
             samples=(first, count),
-            sum_=sum_,
-            sum_of_squares=sum_of_squares,
+            estimate=estimate,
         )
 
     def __repr__(self) -> str:
@@ -125,9 +112,14 @@ class Result:
         return f"<Result {', '.join([about, *how])}>"
 
     @property
+    def dof(self) -> int:
+        """Degrees of freedom of each pixel's variance."""
+        return self.estimate.dof
+
+    @property
     def noise(self) -> float:
         """Mean relative standard error of the image (`relative_noise`)."""
-        return relative_noise(self.image, self.variance)
+        return relative_noise(self.image, self.variance, self.dof)
 
     def save(self, path: str | PathLike[str], exposure: float = 0.0) -> None:
         """Write the picture as .exr (everything, linear) or .png (tone-mapped), by the path's suffix.
@@ -175,9 +167,8 @@ def merge(results: Iterable[Result]) -> Result:
         _check_same_render(results[0], other)
     ranges = _joined([span for result in results for span in result.ranges])
     counts = [result.samples[1] for result in results]
-    merged = Result.from_sums(
-        sum_=np.sum([result.sum_ for result in results], axis=0),
-        sum_of_squares=np.sum([result.sum_of_squares for result in results], axis=0),
+    merged = Result.from_estimate(
+        reduce(lambda one, other: one.plus(other), [result.estimate for result in results]),
         samples=(ranges[0][0], sum(counts)),
         aovs={name: _merged_aov(name, results, counts) for name in results[0].aovs},
         stats=_merged_stats([result.stats for result in results]),

@@ -19,7 +19,7 @@ from clvol.film import FILTER_BINS
 from clvol.prepare import PreparedScene
 from clvol.programs import build_stages
 from clvol.progress import Progress, ProgressCallback
-from clvol.result import Result, mean_and_variance, relative_noise
+from clvol.result import Result, relative_noise
 from clvol.scene.digest import scene_digest
 from clvol.scene.records import Scene
 from clvol.upload import upload_scene
@@ -137,6 +137,7 @@ class Session:
             "absorption": config.absorption if features.media and features.scattering else "none",
             "probability": config.probability if walks and config.weighted and chooses else "none",
             "control": config.control if config.needs_residuals else "none",
+            "sampler": config.sampler,
         }
 
     def biased(self) -> list[str]:
@@ -173,21 +174,21 @@ class Session:
             if callback is None:
                 return
             if progressed.seconds - last_noise[1] >= _NOISE_SECONDS:
-                last_noise[:] = self._noise(progressed.samples_done), progressed.seconds
+                last_noise[:] = self._noise(first, progressed.samples_done), progressed.seconds
             callback(Progress(progressed.samples_done, total, progressed.seconds, time_limit, last_noise[0]))
 
         done = self.wavefront.run(first, count, should_stop, report)
         self.seconds = time.perf_counter() - started
         return done
 
-    def _noise(self, count: int) -> float:
-        return relative_noise(*mean_and_variance(*self.wavefront.sums(), count))
+    def _noise(self, first: int, count: int) -> float:
+        estimate = self.wavefront.estimate(first, count)
+        return relative_noise(*estimate.mean_and_variance(), estimate.dof)
 
     def result(self, first: int, count: int) -> Result:
         """The film as a Result, with what it cost."""
         film = self.prepared.scene.film
         shape = film.window[3], film.window[2]
-        sums = [np.broadcast_to(s, (len(s), 3)).reshape(*shape, 3).copy() for s in self.wavefront.sums()]
         stats = self._statistics(count)
         metadata = {
             "scene": self.prepared.scene.source,
@@ -204,7 +205,8 @@ class Session:
         aovs = {
             name: values.reshape(*shape, *values.shape[1:]) for name, values in self._pictures(count).items()
         }
-        return Result.from_sums(*sums, (first, count), aovs, stats, metadata)
+        estimate = self.wavefront.estimate(first, count).reshaped(*shape, 3)
+        return Result.from_estimate(estimate, (first, count), aovs, stats, metadata)
 
     def _pictures(self, count: int) -> dict[str, np.ndarray]:
         """Look-ups and what `aov` asks for: means per sample, and the largest weight; float32 (pixels,)."""

@@ -18,6 +18,7 @@ from clvol.lights import LightTable, emitter_order, envmap_arrays, light_table
 from clvol.material_table import material_table
 from clvol.medium_table import medium_table, phase_table, rows_3x4
 from clvol.prepare import PreparedScene
+from clvol.sobol import block_table
 from clvol.volumes.bricks import BRICK_SAMPLES
 
 
@@ -32,6 +33,8 @@ def upload_scene(
     emitters = emitter_order(prepared.scene)
     buffers: dict[str, cl.Buffer] = {}
     needed = {argument.name for argument in layout.arguments(config)}
+    if "sobol" in needed:
+        buffers["sobol"] = _buffer(device, block_table())
     if "volumes" in needed:
         buffers |= _volume_buffers(device, prepared)
     if "media" in needed:

@@ -19,6 +19,8 @@ from clvol import layout
 from clvol.config import KernelConfig
 from clvol.device import Device
 from clvol.errors import OptionError
+from clvol.estimate import Estimate, Moments, Replicates
+from clvol.sobol import samples_of_each
 
 NO_JOB = 0xFFFFFFFF
 _NEXT_JOB, _JOB_LIMIT, _NON_FINITE, _DONE = (layout.enum("CONTROL", n) for n in layout.ENUMS["CONTROL"])
@@ -109,7 +111,7 @@ class Wavefront:
         self.buffers = {name: self._buffer(size) for name, size in sizes.items()} | scene_buffers
         self.bytes = sum(sizes.values()) + sum(b.size for b in scene_buffers.values())
         film_sizes = {
-            "film": 16 * self.config.channels * self.pixels,
+            "film": 8 * (self.config.randomizations or 2) * self.config.channels * self.pixels,
             "film_peaks": 4 * self.peaks * self.pixels,
         }
         if self.path_counts:
@@ -208,7 +210,7 @@ class Wavefront:
                 place = finished % self.pool.ring_passes
                 if control[_DONE + place] != samples[finished] * self.sample_jobs:
                     break
-                self._accumulate(place, samples[finished])
+                self._accumulate(place, samples[finished], first + finished * self.pass_samples)
                 finished += 1
                 report(sum(samples[:finished]))
             if finished == passes or (finished == begun and begun and should_stop()):
@@ -219,7 +221,7 @@ class Wavefront:
         is part of setting up and not of the render."""
         self._start_round(0, self.pass_samples * self.sample_jobs, 0, self.pass_samples)
         self._launch(1)
-        self._accumulate(0, 0)
+        self._accumulate(0, 0, 0)
         self._reset_clocks()
 
     def _start_round(self, first: int, pass_jobs: int, last_pass: int, last_samples: int) -> None:
@@ -258,8 +260,8 @@ class Wavefront:
         cl.enqueue_copy(self.device.queue, control, self.buffers["control"], is_blocking=True)
         return control
 
-    def _accumulate(self, ring_pass: int, samples: int) -> None:
-        """Add one finished pass to the film and free its place in the ring."""
+    def _accumulate(self, ring_pass: int, samples: int, first: int) -> None:
+        """Add one finished pass, from sample `first` on, to the film and free its place in the ring."""
         local = 64
         event = self.kernels["accumulate"](
             self.device.queue,
@@ -274,6 +276,7 @@ class Wavefront:
             np.uint32(ring_pass),
             np.uint32(self.pass_samples * self.sample_jobs),
             np.uint32(samples),
+            np.uint32(first),
             np.uint32(self.pixels),
         )
         event.wait()
@@ -286,10 +289,14 @@ class Wavefront:
         cl.enqueue_copy(self.device.queue, array, self.film[name], is_blocking=True)
         return array
 
-    def sums(self) -> tuple[np.ndarray, np.ndarray]:
-        """Sums of the samples and of their squares so far, float64 (pixels, channels)."""
-        film = self._film("film", (self.pixels, self.config.channels, 4), np.float32).astype(np.float64)
-        return film[..., 0] + film[..., 1], film[..., 2] + film[..., 3]
+    def estimate(self, first: int, count: int) -> Estimate:
+        """What the samples `first` to `first + count`, all rendered, add up to; (pixels, channels)."""
+        parts = self.config.randomizations or 2  # else the sum and that of squares
+        film = self._film("film", (self.pixels, parts, self.config.channels, 2), np.float32)
+        sums = np.moveaxis(film[..., 0].astype(np.float64) + film[..., 1], 1, 0)
+        if self.config.randomizations:
+            return Replicates(sums, samples_of_each(first, count))
+        return Moments(sums[0], sums[1], count)
 
     def counts(self) -> dict[str, np.ndarray]:
         """What walks counted so far, by name, uint64 (pixels,)."""

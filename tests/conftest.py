@@ -27,6 +27,17 @@ def pytest_collection_modifyitems(config, items):
             item.add_marker(skip)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def independent_samples():
+    """Tests judge single pixels by their variance, which has many degrees of freedom where samples are
+    independent: that is the default here.  Low-discrepancy samples are asked for by name (test_sobol.py)."""
+    from clvol import choices
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(choices, "DEFAULT_SAMPLER", "independent")
+        yield
+
+
 @pytest.fixture(scope="session")
 def device():
     """The device that CLVOL_DEVICE selects, else the default one."""

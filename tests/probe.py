@@ -76,14 +76,14 @@ class Probe:
         self.config: KernelConfig = kernel_config(self.prepared, self.choices, device)
         self.upload()
 
-    def upload(self):
+    def upload(self, seed=1):
         """Write the prepared scene to the device (again)."""
         device = self.device
         self.buffers = upload_scene(device, self.prepared, self.config, self.choices.step)
         self.buffers["render"] = cl.Buffer(
             device.context,
             cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR,
-            hostbuf=render_record(self.prepared, seed=1),
+            hostbuf=render_record(self.prepared, seed),
         )
 
     def run(self, headers, body, outputs, inputs=()):

@@ -17,6 +17,7 @@ from click.testing import CliRunner, Result
 
 import clvol
 from clvol.cli import main
+from clvol.estimate import Moments
 from clvol.progress import Progress, RichProgress
 from clvol.registry import FAMILIES
 from clvol.result import Result as Picture
@@ -202,7 +203,7 @@ def picture(interrupted: bool) -> Picture:
         "seconds": 1.0,
     }
     stats = {"interrupted": interrupted, "paths": 96, "lookups": 192}
-    return Picture.from_sums(2 * values, 2 * values**2, (0, 2), {}, stats, about)
+    return Picture.from_estimate(Moments(2 * values, 2 * values**2, 2), (0, 2), {}, stats, about)
 
 
 def test_interrupted_render_saves_what_it_has_and_says_so(
@@ -259,6 +260,7 @@ def test_options_reach_render_unchanged(scene: str, tmp_path: Path, monkeypatch:
         "absorption": "auto",
         "probability": "history",
         "control": "auto",
+        "sampler": "auto",
         "majorant_scale": 1.25,
         "step": None,
         "aov": ("cells", "null"),

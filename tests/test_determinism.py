@@ -47,31 +47,36 @@ def absorbing_scene():
     return picture(shapes, [ConstantEmitter()], (0, 0, -4), (0, 0, 0), 20.0, (8, 8))
 
 
+def rendered(described, **options):
+    """With the sampler that users get."""
+    return clvol.render(described, sampler="sobol", **options)
+
+
 def digest(result):
     """Hash of every bit a render answers for."""
-    arrays = (result.image, result.variance, result.sum_, result.sum_of_squares, result.aovs["lookups"])
+    arrays = (result.image, result.variance, result.estimate.sums, result.aovs["lookups"])
     return hashlib.sha256(b"".join(np.ascontiguousarray(a).tobytes() for a in arrays)).hexdigest()
 
 
 @pytest.fixture(scope="module")
 def whole():
-    return clvol.render(scene(), spp=SPP, seed=7)
+    return rendered(scene(), spp=SPP, seed=7)
 
 
 def test_the_same_seed_gives_the_same_bits_twice(whole):
-    again = clvol.render(scene(), spp=SPP, seed=7)
+    again = rendered(scene(), spp=SPP, seed=7)
     assert digest(again) == digest(whole)
 
 
 def test_another_seed_gives_another_picture(whole):
     for seed in (8, 7 + 2**32, 2**64 - 1):
-        assert (clvol.render(scene(), spp=256, seed=seed).image != whole.image).any(axis=2).mean() > 0.9
+        assert (rendered(scene(), spp=256, seed=seed).image != whole.image).any(axis=2).mean() > 0.9
 
 
 def test_no_two_pixels_and_no_two_samples_share_their_random_numbers(whole):
     """A furnace-like scene would hide it: here equal numbers would give equal sums in symmetric pixels."""
-    assert len(np.unique(whole.sum_[..., 0])) == whole.sum_[..., 0].size
-    first, second = (clvol.render(scene(), samples=(n, 1), seed=7).image for n in (0, 1))
+    assert len(np.unique(whole.estimate.sum_[..., 0])) == whole.estimate.sum_[..., 0].size
+    first, second = (rendered(scene(), samples=(n, 1), seed=7).image for n in (0, 1))
     assert (first != second).any()
 
 
@@ -81,13 +86,13 @@ def test_the_launch_geometry_of_a_gpu_does_not_touch_a_bit(whole, monkeypatch):
     monkeypatch.setattr(
         session, "kernel_config", lambda *a: replace(chosen(*a), local_size=64, group_slots=512)
     )
-    assert digest(clvol.render(scene(), spp=SPP, seed=7)) == digest(whole)
+    assert digest(rendered(scene(), spp=SPP, seed=7)) == digest(whole)
 
 
 @pytest.mark.parametrize("pool", [256, 40_000])
 def test_the_pool_size_does_not_touch_a_bit(whole, pool):
     """40,000 slots lengthen the passes as well."""
-    other = clvol.render(scene(), spp=SPP, seed=7, pool=pool)
+    other = rendered(scene(), spp=SPP, seed=7, pool=pool)
     assert other.stats["slots"] != whole.stats["slots"]
     assert digest(other) == digest(whole)
 
@@ -95,10 +100,9 @@ def test_the_pool_size_does_not_touch_a_bit(whole, pool):
 THREAD_SCRIPT = """
 import sys
 sys.path.insert(0, sys.argv[1])
-from test_determinism import SPP, digest, scene
-import clvol
+from test_determinism import SPP, digest, rendered, scene
 from clvol import session
-result = clvol.render(scene(), spp=SPP, seed=7)
+result = rendered(scene(), spp=SPP, seed=7)
 print(digest(result), result.metadata["device"], sep="|")
 """
 
@@ -117,11 +121,11 @@ def test_one_and_two_threads_give_the_same_bits(whole):
 
 @pytest.mark.parametrize("cut", [SPP // 2, 337, 1])
 def test_two_parts_of_the_samples_merge_to_the_whole(whole, cut):
-    parts = [clvol.render(scene(), samples=r, seed=7) for r in ((0, cut), (cut, SPP - cut))]
+    parts = [rendered(scene(), samples=r, seed=7) for r in ((0, cut), (cut, SPP - cut))]
     merged = clvol.merge(parts[::-1])
     assert merged.samples == whole.samples
-    np.testing.assert_allclose(merged.sum_, whole.sum_, rtol=1e-10)
-    np.testing.assert_allclose(merged.sum_of_squares, whole.sum_of_squares, rtol=1e-10)
+    assert (merged.estimate.counts == whole.estimate.counts).all()
+    np.testing.assert_allclose(merged.estimate.sums, whole.estimate.sums, rtol=1e-10)
     np.testing.assert_allclose(merged.image, whole.image, rtol=2e-7)
     np.testing.assert_allclose(merged.variance, whole.variance, rtol=1e-6)
     lookups = [np.rint(r.aovs["lookups"] * float(r.samples[1])).sum() for r in (*parts, whole)]
@@ -130,22 +134,25 @@ def test_two_parts_of_the_samples_merge_to_the_whole(whole, cut):
 
 
 def test_parts_whose_samples_are_whole_numbers_merge_to_the_last_bit():
-    """Absorbing media under a light of 1: each sample is 0 or 1, so that sums are exact."""
+    """Absorbing media under a light of 1: each sample is 0 or 1, so that sums are exact, of squares too."""
     still = absorbing_scene()
     parts = [clvol.render(still, samples=r, seed=9) for r in ((0, 333), (333, 667))]
     merged, single = clvol.merge(parts), clvol.render(still, spp=1000, seed=9)
-    assert len(np.unique(single.sum_)) > 10 and (single.sum_ == np.rint(single.sum_)).all()
-    for name in ("sum_", "sum_of_squares", "image", "variance"):
+    sums = single.estimate.sum_
+    assert len(np.unique(sums)) > 10 and (sums == np.rint(sums)).all()
+    for name in ("sum_", "sum_of_squares"):
+        assert np.array_equal(getattr(merged.estimate, name), getattr(single.estimate, name)), name
+    for name in ("image", "variance"):
         assert np.array_equal(getattr(merged, name), getattr(single, name)), name
 
 
 def test_a_range_of_all_samples_is_the_render_itself(whole):
-    assert digest(clvol.render(scene(), samples=(0, SPP), seed=7)) == digest(whole)
+    assert digest(rendered(scene(), samples=(0, SPP), seed=7)) == digest(whole)
 
 
 def test_samples_are_numbered_up_to_the_end_of_32_bits():
     last = 2**32 - 2
-    low, high = (clvol.render(scene(), samples=r, seed=7) for r in ((0, 1), (last, 1)))
+    low, high = (rendered(scene(), samples=r, seed=7) for r in ((0, 1), (last, 1)))
     assert high.samples == (last, 1)
     assert (low.image != high.image).any()
 
@@ -159,7 +166,7 @@ def interrupted_render(signals=1):
             left[0] -= 1
             signal.raise_signal(signal.SIGINT)  # to this thread, one after the other
 
-    return clvol.render(scene(), spp=50 * SPP, seed=7, progress=press)
+    return rendered(scene(), spp=50 * SPP, seed=7, progress=press)
 
 
 def test_ctrl_c_keeps_whole_passes_of_every_pixel():
@@ -168,7 +175,7 @@ def test_ctrl_c_keeps_whole_passes_of_every_pixel():
     assert cut.stats["interrupted"]
     assert 0 < cut.samples[1] < 50 * SPP
     assert cut.metadata["spp"] == cut.samples[1]
-    assert digest(cut) == digest(clvol.render(scene(), spp=cut.samples[1], seed=7))
+    assert digest(cut) == digest(rendered(scene(), spp=cut.samples[1], seed=7))
 
 
 def test_a_second_ctrl_c_is_a_keyboard_interrupt():
@@ -178,10 +185,10 @@ def test_a_second_ctrl_c_is_a_keyboard_interrupt():
 
 
 def test_a_time_limit_keeps_whole_passes_too():
-    cut = clvol.render(scene(), time_limit=0.3, seed=7)
+    cut = rendered(scene(), time_limit=0.3, seed=7)
     assert not cut.stats["interrupted"]
-    assert digest(cut) == digest(clvol.render(scene(), spp=cut.samples[1], seed=7))
+    assert digest(cut) == digest(rendered(scene(), spp=cut.samples[1], seed=7))
 
 
 def test_an_interrupted_picture_is_not_biased():
-    assert_same_picture(interrupted_render(), clvol.render(scene(), spp=SPP, seed=8))
+    assert_same_picture(interrupted_render(), rendered(scene(), spp=SPP, seed=8))

@@ -11,7 +11,8 @@ import pytest
 
 from clvol import image_io
 from clvol.errors import OptionError
-from clvol.result import Result, mean_and_variance, merge, relative_noise
+from clvol.estimate import Moments
+from clvol.result import Result, merge, relative_noise
 
 HEIGHT, WIDTH = 5, 7
 
@@ -33,9 +34,8 @@ def make_result(first: int, count: int, **changes: object) -> Result:
         "version": "0.1.0",
         "seconds": 0.5 * count,
     }
-    return Result.from_sums(
-        sum_=samples.sum(axis=0),
-        sum_of_squares=(samples**2).sum(axis=0),
+    return Result.from_estimate(
+        Moments(samples.sum(axis=0), (samples**2).sum(axis=0), count),
         samples=(first, count),
         aovs={"lookups": (10 * samples[..., 0].mean(axis=0)).astype(np.float32)},
         stats={"paths": count * HEIGHT * WIDTH, "seconds": {"shade": 0.25}, "largest weight": float(first)},
@@ -58,7 +58,7 @@ def read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, object]]:
 
 def test_variance_is_that_of_the_mean() -> None:
     samples = np.random.default_rng(1).random((16, HEIGHT, WIDTH, 3))
-    mean, variance = mean_and_variance(samples.sum(axis=0), (samples**2).sum(axis=0), 16)
+    mean, variance = Moments(samples.sum(axis=0), (samples**2).sum(axis=0), 16).mean_and_variance()
     np.testing.assert_allclose(mean, samples.mean(axis=0), rtol=1e-12)
     np.testing.assert_allclose(variance, samples.var(axis=0, ddof=1) / 16, rtol=1e-9)
 
@@ -71,20 +71,20 @@ def test_variance_of_a_single_sample_is_unknown() -> None:
 
 def test_variance_of_equal_samples_is_zero_and_never_negative() -> None:
     value = np.full((1, 1, 3), 0.1)
-    _, variance = mean_and_variance(value * 10, value**2 * 10 * (1 - 1e-15), 10)
+    _, variance = Moments(value * 10, value**2 * 10 * (1 - 1e-15), 10).mean_and_variance()
     assert (variance >= 0).all() and (variance < 1e-16).all()
 
 
 def test_image_and_variance_are_float32_and_sums_float64() -> None:
     result = make_result(0, 4)
     assert result.image.dtype == result.variance.dtype == np.float32
-    assert result.sum_.dtype == result.sum_of_squares.dtype == np.float64
+    assert result.estimate.sum_.dtype == result.estimate.sum_of_squares.dtype == np.float64
 
 
 def test_result_without_samples_is_refused() -> None:
     empty = np.zeros((1, 1, 3))
     with pytest.raises(OptionError, match="at least one sample"):
-        Result.from_sums(empty, empty, (0, 0), {}, {}, {})
+        Result.from_estimate(Moments(empty, empty, 0), (0, 0), {}, {}, {})
 
 
 def test_noise_is_standard_error_over_mean_and_passes_over_broken_pixels() -> None:
@@ -142,7 +142,7 @@ def test_results_of_another_render_are_refused_by_name(key: str, value: object) 
 
 def test_results_of_another_size_are_refused() -> None:
     zeros = np.zeros((2, 2, 3))
-    other = Result.from_sums(zeros, zeros, (2, 2), {}, {}, make_result(2, 2).metadata)
+    other = Result.from_estimate(Moments(zeros, zeros, 2), (2, 2), {}, {}, make_result(2, 2).metadata)
     with pytest.raises(OptionError, match=r"different size: \(7, 5\) and \(2, 2\)"):
         merge([make_result(0, 2), other])
 

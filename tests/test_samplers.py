@@ -70,15 +70,19 @@ def test_philox_has_the_published_values_and_those_of_a_second_implementation(pr
 
 def test_decisions_of_a_path_never_share_a_block(probe):
     """Pixel, sample, bounce, block and interval all tell blocks apart, and so does the seed."""
-    grid = np.stack(np.meshgrid([0, 1, 2], [0, 1], [0, 1, 2], range(5), [0, 1], [0, 9]), -1).reshape(-1, 6)
-    out = np.zeros((len(grid), 4), np.uint32)
+    grid = np.stack(np.meshgrid([0, 1, 2], [0, 1], [1, 2, 3], range(6), [0, 1]), -1).reshape(-1, 5)
+    found = []
     body = """
-        __global uint *g = in0 + 6 * i;
+        __global uint *g = in0 + 5 * i;
         SampleKey key;
         key.pixel = g[0], key.sample = g[1], key.bounce = g[2];
-        vstore4(decision_block((uint2)(g[5], 3u), key, g[3], g[4]), i, out0);"""
-    probe.run([], body, [out], [grid.astype(np.uint32)])
-    assert len(np.unique(out, axis=0)) == len(grid)
+        vstore4(decision_block(scene, key, g[3], g[4]), i, out0);"""
+    for seed in (3, 3 + 2**32, 9):
+        out = np.zeros((len(grid), 4), np.uint32)
+        probe.upload(seed)
+        probe.run([], body, [out], [grid.astype(np.uint32)])
+        found.append(out)
+    assert len(np.unique(np.concatenate(found), axis=0)) == 3 * len(grid)
 
 
 def test_streams_are_uniform_and_independent(probe):

@@ -14,8 +14,7 @@ SCALES = {"constant": 1.5, "ramp": 2.0, "sparse": 25.0, "vacuum": 1.0}
 BINS = 40
 
 RAY_BODY = """
-    const SampleKey key = {i, 0, 0};
-    const uint4 k = decision_block((uint2)(%d, 77), key, BLOCK_WALK, 0);
+    const uint4 k = philox4x32((uint4)(i, 0u, 0u, 0u), (uint2)(%d, 77));
     Stream stream = stream_begin(k.z, k.w);
     Tally tally = {0, 0, 0, 0, 0, 0, 0.0f};
     Ray ray;

@@ -1,7 +1,7 @@
 /* Random numbers: counter-based, keyed by (pixel, sample, dimension), never by the ray.
 
    Path decisions (pixel, light, direction, event, first distance) read *numbered dimensions*, four
-   to a block, so that a low-discrepancy sampler can take their place in decision_block() alone.
+   to a block, from the sampler chosen: decision_block() in core/independent.h or core/sobol.h.
    Tracking loops read a *stream* that a block seeds: any number of draws, same counter principle. */
 #ifndef CLVOL_CORE_RANDOM_H
 #define CLVOL_CORE_RANDOM_H
@@ -37,10 +37,10 @@ INLINE uint4 philox4x32(uint4 counter, uint2 key)
     return (uint4)(a, b, c, d);
 }
 
-/* Four numbered dimensions, full 32-bit.  `interval` tells apart the walks of one bounce. */
-INLINE uint4 decision_block(uint2 seed, SampleKey key, uint block, uint interval)
+/* Where a block's numbers stand among those of a path. */
+INLINE uint block_number(SampleKey key, uint block)
 {
-    return philox4x32((uint4)(key.pixel, key.sample, key.bounce * 8u + block, interval), seed);
+    return key.bounce * 8u + block;
 }
 
 /* (k + 1/2) / 2^32: never 0; rounds to 1 only within 2^-25 of it, so compare where that is safe. */

@@ -14,6 +14,36 @@ INLINE float2 add_exactly(float2 sum, float value)
     return (float2)(total, sum.y + lost);
 }
 
+#if CLVOL_RANDOMIZATIONS
+#define FILM_PARTS CLVOL_RANDOMIZATIONS
+/* The sum of each randomisation's samples. */
+INLINE void add_samples(__global const float *values, uint samples, uint first_sample, __global float *film)
+{
+    for (uint r = 0; r < CLVOL_RANDOMIZATIONS; ++r) {
+        float2 sum = vload2(r * CLVOL_CHANNELS, film);
+        for (uint s = (r - first_sample) % CLVOL_RANDOMIZATIONS; s < samples; s += CLVOL_RANDOMIZATIONS)
+            sum = add_exactly(sum, values[s * CLVOL_CHANNELS]);
+        vstore2(sum, r * CLVOL_CHANNELS, film);
+    }
+}
+#else
+#define FILM_PARTS 2
+/* The sum of the samples, and that of their squares. */
+INLINE void add_samples(__global const float *values, uint samples, uint first_sample, __global float *film)
+{
+    float2 sum = vload2(0, film), squares = vload2(CLVOL_CHANNELS, film);
+    for (uint s = 0; s < samples; ++s) {
+        const float x = values[s * CLVOL_CHANNELS];
+        const float square = x * x;
+        sum = add_exactly(sum, x);
+        squares = add_exactly(squares, square);
+        squares.y += fma(x, x, -square);
+    }
+    vstore2(sum, 0, film);
+    vstore2(squares, CLVOL_CHANNELS, film);
+}
+#endif
+
 __kernel void accumulate_kernel(__global const float *results, __global float *film, __global float *film_peaks,
 #if CLVOL_RESULT_COUNTS
                                 __global const uint *result_counts,
@@ -24,7 +54,8 @@ __kernel void accumulate_kernel(__global const float *results, __global float *f
 #if CLVOL_FIRST_HIT
                                 __global const float *result_firsts, __global float *film_firsts,
 #endif
-                                __global uint *control, uint ring_pass, uint pass_jobs, uint samples, uint pixels)
+                                __global uint *control, uint ring_pass, uint pass_jobs, uint samples,
+                                uint first_sample, uint pixels)
 {
     const uint pixel = get_global_id(0);
     if (pixel >= pixels)
@@ -42,19 +73,14 @@ __kernel void accumulate_kernel(__global const float *results, __global float *f
 #endif
     float peak = film_peaks[(size_t)pixel * CLVOL_PEAKS];
     for (uint c = 0; c < CLVOL_CHANNELS; ++c) {
-        const size_t at = (size_t)pixel * CLVOL_CHANNELS + c;
-        float4 f = vload4(at, film); /* sum, its error, sum of squares, its error */
+        __global const float *values = results + first * CLVOL_CHANNELS + c;
         for (uint s = 0; s < samples; ++s) {
-            const float x = results[(first + s) * CLVOL_CHANNELS + c];
+            const float x = values[s * CLVOL_CHANNELS];
             if (!isfinite(x))
                 atomic_inc(control + CONTROL_NON_FINITE);
-            const float square = x * x;
             peak = max_of(peak, abs_of(x));
-            f.xy = add_exactly(f.xy, x);
-            f.zw = add_exactly(f.zw, square);
-            f.w += fma(x, x, -square);
         }
-        vstore4(f, at, film);
+        add_samples(values, samples, first_sample, film + (size_t)pixel * (2 * FILM_PARTS * CLVOL_CHANNELS) + 2 * c);
     }
     film_peaks[(size_t)pixel * CLVOL_PEAKS] = peak;
 #if CLVOL_FIRST_HIT

@@ -37,7 +37,7 @@ INLINE bool survives_absorption(const Scene *scene, uint slot, SampleKey key, ui
             survival = weight > 0.0f ? 1.0f : 0.0f;
     }
     if (survival < 1.0f) {
-        const uint4 k = decision_block(render_seed(scene), key, BLOCK_WALK, interval);
+        const uint4 k = decision_block(scene, key, BLOCK_WALK, interval);
         if (!choose_event(k.y, survival, 1.0f - survival))
             return false;
         if (CLVOL_ABSORPTION == ABSORPTION_MIXED)
@@ -53,7 +53,7 @@ INLINE void next_event(const Scene *scene, uint group, uint slot, SampleKey key,
 #if CLVOL_NEE
     if (!medium->sample_emitters)
         return;
-    const uint4 k = decision_block(render_seed(scene), key, BLOCK_LIGHT, 0);
+    const uint4 k = decision_block(scene, key, BLOCK_LIGHT, 0);
     const LightSample light =
         sample_light(scene, p, uniform_below_one(k.x), uniform_below_one(k.y), uniform_below_one(k.z));
     const float pdf = phase_pdf(scene, medium, wo, light.direction);
@@ -78,7 +78,7 @@ INLINE bool scatter(const Scene *scene, uint group, uint slot, SampleKey key, __
     set_path_bounce(scene, slot, key.bounce); /* also numbers the shadow ray's random numbers */
     const Ray ray = path_ray(scene, slot);
     next_event(scene, group, slot, key, medium, ray.o, ray.d, beta);
-    const uint4 k = decision_block(render_seed(scene), key, BLOCK_DIRECTION, 0);
+    const uint4 k = decision_block(scene, key, BLOCK_DIRECTION, 0);
     if (key.bounce > scene->render->rr_depth) {
         float survival = spectrum_max(beta);
 #if CLVOL_HAS_TRANSMISSION

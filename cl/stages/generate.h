@@ -93,7 +93,7 @@ INLINE void start_job(const Scene *scene, uint slot, uint job)
     key.pixel = pixel;
     key.sample = render->first_sample + pass * render->pass_samples + in_pass % samples;
     key.bounce = 0;
-    const uint4 k = decision_block(render_seed(scene), key, BLOCK_CAMERA, 0);
+    const uint4 k = decision_block(scene, key, BLOCK_CAMERA, 0);
     const int width = render->film_size[0];
     const int px = (int)(pixel % (uint)width), py = (int)(pixel / (uint)width);
     float weight = 1.0f;

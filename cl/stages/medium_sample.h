@@ -50,7 +50,7 @@ INLINE void medium_sample(const Scene *scene, uint group, uint slot)
     const Ray ray = path_ray(scene, slot);
     const MediumRay in = medium_ray(scene, scene->media, ray, path_interval_end(scene, slot),
                                     (int)path_channel_or_zero(scene, slot));
-    const uint4 k = decision_block(render_seed(scene), key, BLOCK_WALK, 0);
+    const uint4 k = decision_block(scene, key, BLOCK_WALK, 0);
     Tally tally = {0, 0, 0, 0, 0, 0, 0.0f};
     Collision collision;
     collision.beta = get_beta(scene, slot);

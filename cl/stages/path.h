@@ -48,11 +48,6 @@ INLINE SampleKey path_key(const Scene *scene, uint slot)
     return key;
 }
 
-INLINE uint2 render_seed(const Scene *scene)
-{
-    return (uint2)(scene->render->seed[0], scene->render->seed[1]);
-}
-
 INLINE Ray path_ray(const Scene *scene, uint slot)
 {
     Ray ray;

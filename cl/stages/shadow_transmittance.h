@@ -24,7 +24,7 @@ INLINE bool media_transmittance(const Scene *scene, SampleKey key, Ray ray, cons
         float t0, t1;
         if (!medium_part(scene, m, ray, inside, from, to, &t0, &t1))
             continue;
-        const uint4 k = decision_block(render_seed(scene), key, BLOCK_SHADOW, walk_number(scene, stretch, (int)m));
+        const uint4 k = decision_block(scene, key, BLOCK_SHADOW, walk_number(scene, stretch, (int)m));
         Ray start = ray;
         start.o += t0 * ray.d;
         const MediumRay in = part_ray(scene, inside, (int)m, start, t1 - t0, channel);

@@ -50,7 +50,7 @@ INLINE void medium_sample(const Scene *scene, uint group, uint slot)
             start.o += part.start * ray.d;
             const MediumRay in = part_ray(scene, &inside, part.medium, start, min_of(part.end, reach) - part.start,
                                           (int)path_channel_or_zero(scene, slot));
-            const uint4 k = decision_block(render_seed(scene), key, BLOCK_WALK, walk_number(scene, stretch, part.medium));
+            const uint4 k = decision_block(scene, key, BLOCK_WALK, walk_number(scene, stretch, part.medium));
             collision.beta = JOINT_WEIGHTS ? before : beta;
             const bool collided = medium_collision(&in, k, &tally, &collision);
             beta = JOINT_WEIGHTS ? beta * weight_ratio(collision.beta, before) : collision.beta;

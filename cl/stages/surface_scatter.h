@@ -47,7 +47,7 @@ INLINE void surface_next_event(const Scene *scene, uint group, uint slot, Sample
 #if CLVOL_NEE
     if (material_is_smooth(side->material))
         return;
-    const uint4 k = decision_block(render_seed(scene), key, BLOCK_LIGHT, 0);
+    const uint4 k = decision_block(scene, key, BLOCK_LIGHT, 0);
     const LightSample light =
         sample_light(scene, surface->p, uniform_below_one(k.x), uniform_below_one(k.y), uniform_below_one(k.z));
     float pdf;
@@ -78,7 +78,7 @@ INLINE bool leave_surface(const Scene *scene, uint slot, SampleKey key, const Su
     if (survival == 0.0f) /* not so for NaN, which is to be seen */
         return false;
     if (key.bounce > scene->render->rr_depth && survival < 1.0f) {
-        const uint4 k = decision_block(render_seed(scene), key, BLOCK_DIRECTION, 0);
+        const uint4 k = decision_block(scene, key, BLOCK_DIRECTION, 0);
         if (uniform_float(k.z) >= survival)
             return false;
         beta /= survival;
@@ -116,7 +116,7 @@ INLINE bool shade_surface(const Scene *scene, uint group, uint slot)
     Side side;
     if (!side_of(scene, shape, wi, &side))
         return false;
-    const uint4 k = decision_block(render_seed(scene), key, BLOCK_SURFACE, path_stretch_or_zero(scene, slot));
+    const uint4 k = decision_block(scene, key, BLOCK_SURFACE, path_stretch_or_zero(scene, slot));
 #if CLVOL_HAS_PASSABLE
     if (side.material->kind == MATERIAL_NULL)
         return pass_on(scene, slot, ray, &hit, &surface);

@@ -7,7 +7,16 @@ from dataclasses import dataclass
 from clvol.scene.reader import Reader
 from clvol.scene.records import Integrator
 
-CHOICES = ("technique", "transmittance", "majorant", "lookup", "absorption", "probability", "control")
+CHOICES = (
+    "technique",
+    "transmittance",
+    "majorant",
+    "lookup",
+    "absorption",
+    "probability",
+    "control",
+    "sampler",
+)
 """Parameters handed on as strings; what they may say is for the registry of techniques to judge."""
 
 

@@ -1,0 +1,12 @@
+/* Sampler "independent": no number that a path decides by has to do with another. */
+#ifndef CLVOL_CORE_INDEPENDENT_H
+#define CLVOL_CORE_INDEPENDENT_H
+
+/* Four numbered dimensions, full 32-bit.  `interval` tells apart the walks of one bounce. */
+INLINE uint4 decision_block(const Scene *scene, SampleKey key, uint block, uint interval)
+{
+    const uint4 counter = (uint4)(key.pixel, key.sample, block_number(key, block), interval);
+    return philox4x32(counter, (uint2)(scene->render->seed[0], scene->render->seed[1]));
+}
+
+#endif

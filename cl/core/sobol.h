@@ -1,0 +1,94 @@
+/* Sampler "sobol": what a pixel's samples decide by is a Sobol' sequence, Owen-scrambled anew for each pixel and
+   randomisation, so that samples cover each decision evenly, and those of a path's beginning together.
+
+   Every number alone is exactly uniform and independent of the others of its path: no mean changes.
+   Samples of one randomisation depend on each other; randomisations do not (clvol/estimate.py). */
+#ifndef CLVOL_CORE_SOBOL_H
+#define CLVOL_CORE_SOBOL_H
+
+/* Groups of dimensions in clvol/sobol.py. */
+#define SOBOL_CAMERA 0u
+#define SOBOL_WALK 1u
+#define SOBOL_LIGHT 2u
+#define SOBOL_SHADOW 3u
+#define SOBOL_DIRECTION 4u
+#define SOBOL_PER_BOUNCE 4u
+#define SOBOL_OTHER 9u
+#define SOBOL_BOUNCES 2u
+#define SOBOL_SHUFFLED 0x3FFu /* samples are put in another order within runs of so many and one */
+
+INLINE uint reverse_bits(uint x)
+{
+    x = ((x >> 1) & 0x55555555u) | ((x & 0x55555555u) << 1);
+    x = ((x >> 2) & 0x33333333u) | ((x & 0x33333333u) << 2);
+    x = ((x >> 4) & 0x0F0F0F0Fu) | ((x & 0x0F0F0F0Fu) << 4);
+    x = ((x >> 8) & 0x00FF00FFu) | ((x & 0x00FF00FFu) << 8);
+    return (x >> 16) | (x << 16);
+}
+
+/* Owen's nested uniform scrambling of the number whose bits x has in reverse: a bit is flipped by a function of
+   the seed and of the bits before it (Laine and Karras 2011, with Burley's constants).  Uniform seeds
+   give uniform numbers. */
+INLINE uint owen_scramble(uint x, uint seed)
+{
+    x += seed;
+    x ^= x * 0x6C50B47Cu;
+    x ^= x * 0xB82F1E52u;
+    x ^= x * 0xC7AFE638u;
+    x ^= x * 0x8D22F6E6u;
+    return x;
+}
+
+/* Wellons' lowbias32. */
+INLINE uint mixed_bits(uint x)
+{
+    x = (x ^ (x >> 16)) * 0x7FEB352Du;
+    x = (x ^ (x >> 15)) * 0x846CA68Bu;
+    return x ^ (x >> 16);
+}
+
+/* The dimensions that a block takes. */
+INLINE uint sobol_group(SampleKey key, uint block, uint interval)
+{
+    if (block == BLOCK_CAMERA)
+        return SOBOL_CAMERA;
+    const bool after = block == BLOCK_LIGHT || block == BLOCK_SHADOW || block == BLOCK_DIRECTION; /* the scattering */
+    const uint bounce = after ? key.bounce - 1u : key.bounce;
+    if (interval > 0 || bounce >= SOBOL_BOUNCES)
+        return SOBOL_OTHER;
+    const uint first = block == BLOCK_WALK     ? SOBOL_WALK
+                       : block == BLOCK_LIGHT  ? SOBOL_LIGHT
+                       : block == BLOCK_SHADOW ? SOBOL_SHADOW
+                                               : SOBOL_DIRECTION;
+    return first + SOBOL_PER_BOUNCE * bounce;
+}
+
+/* Number `index` of the sequence in a group's four dimensions, bits reversed. */
+INLINE uint4 sobol_point(const Scene *scene, uint group, uint index)
+{
+    __global const uint *digits = scene->sobol + group * (8u * 16u * 4u);
+    uint4 point = (uint4)(0u);
+    for (; index > 0; index >>= 4, digits += 16 * 4)
+        point ^= vload4(index & 15u, digits);
+    return point;
+}
+
+/* Four numbered dimensions, full 32-bit.  `interval` tells apart the walks of one bounce. */
+INLINE uint4 decision_block(const Scene *scene, SampleKey key, uint block, uint interval)
+{
+    const uint2 seed = (uint2)(scene->render->seed[0], scene->render->seed[1]);
+    const uint randomization = key.sample % CLVOL_RANDOMIZATIONS;
+    const uint number = block_number(key, block), group = sobol_group(key, block, interval);
+    uint index = key.sample / CLVOL_RANDOMIZATIONS;
+    if (group == SOBOL_OTHER) {
+        const uint place = mixed_bits(number ^ (interval << 16) ^ mixed_bits(seed.x ^ mixed_bits(seed.y ^ randomization)));
+        const uint order = reverse_bits(owen_scramble(reverse_bits(index), mixed_bits(key.pixel ^ place)));
+        index = (order & SOBOL_SHUFFLED) | (index & ~SOBOL_SHUFFLED);
+    }
+    const uint4 point = sobol_point(scene, group, index);
+    const uint4 scramble = philox4x32((uint4)(key.pixel, randomization, number, interval), seed);
+    return (uint4)(reverse_bits(owen_scramble(point.x, scramble.x)), reverse_bits(owen_scramble(point.y, scramble.y)),
+                   reverse_bits(owen_scramble(point.z, scramble.z)), reverse_bits(owen_scramble(point.w, scramble.w)));
+}
+
+#endif
