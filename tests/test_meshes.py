@@ -160,6 +160,22 @@ def test_polygons_become_triangles(mesh):
         assert (areas > 0).all()
 
 
+def test_normals_of_a_ply_stay_with_their_vertices_where_a_seam_repeats_positions(mesh):
+    rng = np.random.default_rng(1)
+    positions = np.array(
+        [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (1, 0, 0), (1, 1, 0), (2, 0, 0), (2, 1, 0)]
+    )
+    normals = rng.normal(size=(8, 3)) * 0.3 + (0, 0, 1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals[4:6] = normals[1:3]
+    uvs = rng.random((8, 2))
+    faces = np.array([(0, 1, 2), (0, 2, 3), (4, 6, 7), (4, 7, 5)])
+    rows = np.hstack([positions, normals, uvs])
+    found = mesh(ascii_ply(rows, faces, ("x", "y", "z", "nx", "ny", "nz", "u", "v")), "ply")
+    for of, given in ("vertices", positions), ("normals", normals), ("uvs", uvs):
+        np.testing.assert_allclose(corners(found, of), given[faces], atol=1e-6)
+
+
 @pytest.mark.parametrize("order", ["<", ">"])
 def test_a_binary_ply_may_mix_triangles_and_other_polygons(mesh, order):
     """trimesh reads none that does."""

@@ -20,8 +20,9 @@ import clvol
 from clvol.scene.loader import PLUGINS
 
 TOOLS = Path(__file__).resolve().parent.parent / "tools"
-RUNS = 16
-"""Independent renders of Mitsuba, whose scatter is the variance of their mean."""
+RUNS = 32
+"""Independent renders of Mitsuba, whose scatter is the variance of their mean; few would cost power, as
+Student's t has long tails where degrees of freedom are few."""
 TILE = 8
 BIAS = 0.01
 """Of the image mean: what every comparison must see at least."""
@@ -29,20 +30,20 @@ ROUNDING = 2e-6
 """Of the picture's mean: what is equal but for rounding of floats has no variance to excuse it."""
 
 PICTURES = {  # scene, its defaults, samples per pixel of each of Mitsuba's renders and of ours
-    "room": ("room", {}, 128, 1024),
-    "glass": ("glass", {}, 64, 512),
-    "meshes": ("meshes", {}, 128, 1024),
-    "lamps": ("lamps", {}, 128, 1024),
-    "fog": ("fog", {}, 128, 1024),
-    "cloud": ("cloud", {}, 32, 512),
-    "bodies": ("bodies", {}, 96, 768),
-    "passages": ("passages", {}, 64, 512),
-    "passages, depth 1": ("passages", {"depth": 1, "rfilter": "lanczos"}, 64, 2048),
-    "passages, depth 2": ("passages", {"depth": 2, "rfilter": "catmullrom"}, 64, 1024),
-    "passages, depth 3": ("passages", {"depth": 3}, 64, 512),
-    "fog, depth 3": ("fog", {"depth": 3}, 64, 512),
-    "passages, hidden": ("passages", {"hide": "true", "depth": 5}, 64, 512),
-    "lamps, hidden": ("lamps", {"hide": "true", "integrator": "volpath"}, 256, 2048),
+    "room": ("room", {}, 96, 2048),
+    "glass": ("glass", {}, 32, 1024),
+    "meshes": ("meshes", {}, 32, 4096),
+    "lamps": ("lamps", {}, 64, 2048),
+    "fog": ("fog", {}, 96, 4096),
+    "cloud": ("cloud", {}, 24, 1024),
+    "bodies": ("bodies", {}, 48, 768),
+    "passages": ("passages", {}, 16, 512),
+    "passages, depth 1": ("passages", {"depth": 1, "rfilter": "lanczos"}, 32, 4096),
+    "passages, depth 2": ("passages", {"depth": 2, "rfilter": "catmullrom"}, 32, 2048),
+    "passages, depth 3": ("passages", {"depth": 3}, 16, 512),
+    "fog, depth 3": ("fog", {"depth": 3}, 96, 4096),
+    "passages, hidden": ("passages", {"hide": "true", "depth": 5}, 32, 1024),
+    "lamps, hidden": ("lamps", {"hide": "true", "integrator": "volpath"}, 160, 8192),
 }
 
 
@@ -128,7 +129,7 @@ def test_both_render_the_same_picture(folder, mitsuba, record_property, name):
 
 @pytest.mark.mitsuba
 def test_a_picture_that_lacks_its_last_two_bounces_is_noticed(folder, mitsuba):
-    theirs, result = both(folder, mitsuba, "passages", {"depth": 5}, 64, 512, {"depth": 3})
+    theirs, result = both(folder, mitsuba, "passages", {"depth": 5}, 16, 512, {"depth": 3})
     found, _ = compare(theirs, result, sidak(FALSE_ALARM, len(PICTURES)))
     assert found
 

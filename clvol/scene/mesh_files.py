@@ -57,7 +57,9 @@ def _read_with_trimesh(path: Path, kind: str) -> RawMesh:
     import trimesh  # takes half a second, which scenes without meshes are spared
 
     with np.errstate(all="ignore"):
-        loaded = trimesh.load(str(path), file_type=kind, process=False, maintain_order=True)
+        # trimesh's repair of texture coordinates renumbers a ply's vertices, but not its normals
+        options = {"fix_texture": False} if kind == "ply" else {}
+        loaded = trimesh.load(str(path), file_type=kind, process=False, maintain_order=True, **options)
     if isinstance(loaded, trimesh.Trimesh):
         return _raw(loaded, np.eye(4))
     parts = []
