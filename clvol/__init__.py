@@ -12,6 +12,7 @@ from importlib import import_module
 from clvol.version import __version__
 
 _EXPORTS = {
+    "compare": "clvol.comparison",
     "Error": "clvol.errors",
     "load_dict": "clvol.scene",
     "load_file": "clvol.scene",
@@ -22,6 +23,8 @@ _EXPORTS = {
     "rotate": "clvol.scene",
     "scale": "clvol.scene",
     "Scene": "clvol.scene.records",
+    "selftest": "clvol.selftesting",
+    "trace_ray": "clvol.ray.trace",
     "translate": "clvol.scene",
 }
 

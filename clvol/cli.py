@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from clvol.cli_compare import compare
 from clvol.cli_options import (
     INTERRUPTED,
     Definition,
@@ -18,6 +19,8 @@ from clvol.cli_options import (
     choice_options,
     finite,
 )
+from clvol.cli_ray import ray
+from clvol.cli_selftest import selftest
 from clvol.errors import Error
 
 if TYPE_CHECKING:
@@ -33,6 +36,7 @@ Examples:
   clvol render scenes/cloud.xml -o cloud.exr --time 20 -v
   clvol render scenes/cloud.xml -o cloud.exr -D res=512 --majorant global
   clvol render scenes/cloud.xml -o cloud.exr --technique decomposition --transmittance residual-ratio
+  clvol render scenes/smoke.xml -o smoke.exr --technique auto:pilot
   clvol render scenes/fire.xml -o fire.exr --technique weighted-delta --majorant-scale 0.8
   clvol render scenes/smoke.xml -o smoke.exr --aov cells --aov largest_weight
 """
@@ -218,6 +222,8 @@ def _summary(result: Result, outputs: tuple[str, ...]) -> Iterator[str]:
     chosen = ", ".join(f"{key} {about[key]}" for key in choices)
     lookups = result.stats["lookups"] / max(width * height * count, 1)
     yield f"  {chosen}; {lookups:.4g} look-ups per sample"
+    if "pilot" in about:
+        yield f"  pilot: {about['pilot_reason']}; repeat with {about['repeat']}"
 
 
 @main.command()
@@ -253,6 +259,12 @@ def devices() -> None:
         click.echo(f"   {device.platform}, {device.version}")
         click.echo(f"   {device.kind}, {device.compute_units} compute units, {memory}")
 
+
+main.add_command(selftest)
+
+main.add_command(ray)
+
+main.add_command(compare)
 
 if __name__ == "__main__":
     main()

@@ -12,6 +12,7 @@ import click
 from clvol.errors import DeviceError, Error, OptionError
 
 USER_ERROR = 2
+PILOT_HELP = [("auto:pilot", "measures, then picks the technique, transmittance and majorant left at auto")]
 INTERRUPTED = 130
 
 
@@ -62,10 +63,13 @@ def _usage_message(error: click.UsageError) -> str:
 
 
 class RegistryChoice(click.ParamType):
-    """A name of one family of `clvol.registry`, or "auto"; the registry is read when it is needed."""
+    """A name of one family of `clvol.registry`, or "auto"; the registry is read when it is needed.
 
-    def __init__(self, family: str) -> None:
-        self.name = family
+    `pilot`: a technique may be "auto:pilot" too.
+    """
+
+    def __init__(self, family: str, pilot: bool = False) -> None:
+        self.name, self.pilot = family, pilot
 
     def entries(self) -> dict[str, Any]:
         """The family's table: name to an object with a one-line `summary`."""
@@ -75,13 +79,15 @@ class RegistryChoice(click.ParamType):
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
         """The choices as they stand in --help."""
-        return f"[{'|'.join(['auto', *self.entries()])}]"
+        from clvol.registry import automatic
+
+        return f"[{'|'.join([*(automatic(self.name) if self.pilot else ['auto']), *self.entries()])}]"
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """The value itself if it is known; OptionError with the known ones if not."""
         from clvol.registry import check_choice
 
-        return check_choice(self.name, value)
+        return check_choice(self.name, value, self.pilot)
 
 
 class Definition(click.ParamType):
@@ -112,7 +118,7 @@ def choice_options(command: Any) -> Any:
 
     for family in reversed(FAMILIES):
         text = FAMILY_PURPOSE[family]
-        option = click.option(f"--{family}", type=RegistryChoice(family), default="auto", help=text)
+        option = click.option(f"--{family}", type=RegistryChoice(family, True), default="auto", help=text)
         command = option(command)
     return command
 
@@ -125,6 +131,9 @@ class ExplainedCommand(click.Command):
         for parameter in self.params:
             if isinstance(parameter.type, RegistryChoice):
                 entries = parameter.type.entries()
+                automatic = PILOT_HELP if parameter.type.pilot and parameter.type.name == "technique" else []
                 with formatter.section(parameter.opts[0]):
-                    formatter.write_dl([(name, entry.summary) for name, entry in entries.items()])
+                    formatter.write_dl(
+                        [*automatic, *((name, entry.summary) for name, entry in entries.items())]
+                    )
         super().format_epilog(ctx, formatter)

@@ -29,6 +29,8 @@ class Progress:
         Seconds after which no new sample is begun.
     noise : float
         Mean relative standard error of the image so far (`clvol.result.relative_noise`); nan while unknown.
+    what : str
+        What is going on; samples are those of the picture only while it is "rendering", else steps.
     """
 
     samples_done: int
@@ -36,6 +38,7 @@ class Progress:
     seconds: float
     time_limit: float | None = None
     noise: float = math.nan
+    what: str = "rendering"
 
     @property
     def fraction(self) -> float:
@@ -66,7 +69,8 @@ ProgressCallback = Callable[[Progress], None]
 def format_samples(record: Progress) -> str:
     """Samples done, as "12/64 spp", or "12 spp" where only time ends the render."""
     total = "" if record.samples_total is None else f"/{record.samples_total}"
-    return f"{record.samples_done}{total} spp"
+    unit = " spp" if record.what == "rendering" else ""
+    return f"{record.samples_done}{total}{unit}"
 
 
 def format_noise(noise: float) -> str:
@@ -106,7 +110,7 @@ class RichProgress:
         from rich.progress import Progress as RichBar
 
         self._bar = RichBar(
-            TextColumn("rendering"),
+            TextColumn("{task.description}"),
             BarColumn(),
             TextColumn("{task.fields[samples]}  {task.fields[left]} left  noise {task.fields[noise]}"),
             console=self.console,
@@ -122,6 +126,7 @@ class RichProgress:
             return
         self._bar.update(
             self._task,
+            description=record.what,
             completed=record.fraction,
             samples=format_samples(record),
             left=format_seconds(record.seconds_left),

@@ -185,9 +185,21 @@ AOVS = (
 )
 
 
-def check_choice(family: str, value: str) -> str:
-    """Return `value` if it is "auto" or a legal choice of `family`, else raise OptionError listing them."""
-    choices = ["auto", *FAMILIES[family]]
+PILOT = "auto:pilot"
+"""The technique that has a measured pilot choose technique, transmittance and majorant."""
+
+
+def automatic(family: str) -> list[str]:
+    """What a user may say instead of a choice of `family`."""
+    return ["auto", PILOT] if family == "technique" else ["auto"]
+
+
+def check_choice(family: str, value: str, pilot: bool = False) -> str:
+    """Return `value` if it is "auto" or a legal choice of `family`, else raise OptionError listing them.
+
+    `pilot`: `PILOT` is one too, where a render chooses.
+    """
+    choices = [*(automatic(family) if pilot else ["auto"]), *FAMILIES[family]]
     if value in choices:
         return value
     close = difflib.get_close_matches(str(value), choices, n=1)

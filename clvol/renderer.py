@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import logging
 import operator
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 
 from clvol import registry
 from clvol.choices import Choices
-from clvol.device import open_device
+from clvol.device import Device, open_device
 from clvol.errors import OptionError
-from clvol.progress import ProgressCallback, RichProgress
+from clvol.progress import Progress, ProgressCallback, RichProgress
 from clvol.result import Result
 from clvol.scene.records import Scene
 from clvol.session import MAX_SAMPLES, Session
+
+log = logging.getLogger("clvol")
 
 
 def render(
@@ -48,7 +53,8 @@ def render(
     spp, seed : samples per pixel and 64-bit seed; default to the scene's.
     technique, transmittance, majorant, lookup, absorption, probability, control, sampler : names from
         `clvol.registry`; "auto" takes the scene's own choice, else follows fixed rules, so that the same seed
-        gives the same bits.
+        gives the same bits; technique "auto:pilot" has a short measured pilot choose technique,
+        transmittance and majorant, where they are left at auto (`result.metadata["repeat"]` says what).
     majorant_scale : multiplies every bound of the density, for experiments; below 1 only for techniques and
         transmittances that stay unbiased there.
     step : world length of a step of ray marching; the edge of a voxel by default.
@@ -82,19 +88,59 @@ def render(
         "control": control,
         "sampler": sampler,
     }
+    piloted = technique == registry.PILOT
+    if piloted:
+        asked["technique"] = "auto"
     names = {family: _choice(scene, family, value) for family, value in asked.items()}
+    if piloted:
+        names["technique"] = "auto"  # the scene's own technique too is put to the test
     choices = Choices(**names, majorant_scale=majorant_scale, step=step, aov=aov)
     first, count = _sample_range(scene, spp, time_limit, samples)
     seed = scene.seed if seed is None else seed
-    session = Session.for_scene(open_device(device), scene, choices, seed, pool)
+    bar = RichProgress() if progress is True else nullcontext(progress or None)
+    opened, about = open_device(device), {}
+    if piloted:
+        with bar as callback:
+            choices, about = _piloted(opened, scene, choices, seed, count, time_limit, callback)
+    session = Session.for_scene(opened, scene, choices, seed, pool)
     session.describe()
     session.warn_of_unused(asked)
-    bar = RichProgress() if progress is True else nullcontext(progress or None)
     with bar as callback, _interrupt_flag() as interrupted:
         done = session.run(first, count, time_limit, callback, interrupted)
     result = session.result(first, done)
     result.stats["interrupted"] = bool(interrupted())
+    result.metadata |= about
     return result
+
+
+def _piloted(
+    device: Device,
+    scene: Scene,
+    choices: Choices,
+    seed: int,
+    count: int,
+    time_limit: float | None,
+    callback: ProgressCallback | None,
+) -> tuple[Choices, dict[str, str]]:
+    """What a pilot makes of `choices`, and what the metadata say of it."""
+    from clvol.pilot import pilot
+
+    started = time.perf_counter()
+
+    def tell(done: int, total: int) -> None:
+        if callback is not None:
+            callback(Progress(done, total, time.perf_counter() - started, what="pilot"))
+
+    found = pilot(device, scene, choices, seed=seed, spp=count, time_limit=time_limit, tell=tell)
+    given = {f: n for f, n in choices.names.items() if n != "auto" and f not in found.names}
+    options = " ".join([found.options, *(f"--{family} {name}" for family, name in given.items())])
+    if choices.majorant_scale != 1:
+        options += f" --majorant-scale {choices.majorant_scale:g}"
+    repeat = f"clvol render {scene.source or 'SCENE'} … {' '.join(options.split())} --seed {seed}"
+    log.info("pilot: %s; %s", ", ".join(f"{k} {v}" for k, v in found.names.items()), found.reason)
+    log.info("pilot: repeat with %s", repeat)
+    about = {"pilot": found.options, "pilot_reason": found.reason, "repeat": repeat}
+    return replace(choices, **found.names), about
 
 
 def _choice(scene: Scene, family: str, value: str) -> str:

@@ -121,6 +121,18 @@ class Result:
         """Mean relative standard error of the image (`relative_noise`)."""
         return relative_noise(self.image, self.variance, self.dof)
 
+    def _repr_png_(self) -> bytes:
+        """The picture as a PNG, tone-mapped: how a notebook shows a result."""
+        import tempfile
+        from pathlib import Path
+
+        from clvol import image_io
+
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, "result.png")
+            image_io.write_png(path, self.image, self.metadata)
+            return path.read_bytes()
+
     def save(self, path: str | PathLike[str], exposure: float = 0.0) -> None:
         """Write the picture as .exr (everything, linear) or .png (tone-mapped), by the path's suffix.
 

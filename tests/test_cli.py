@@ -19,7 +19,7 @@ import clvol
 from clvol.cli import main
 from clvol.estimate import Moments
 from clvol.progress import Progress, RichProgress
-from clvol.registry import FAMILIES
+from clvol.registry import FAMILIES, automatic
 from clvol.result import Result as Picture
 
 SCENE = """<scene version="3.0.0">
@@ -79,7 +79,7 @@ def test_help_lists_the_commands_with_examples(arguments: list[str]) -> None:
 def test_render_help_reads_its_choices_from_the_registry() -> None:
     text = "".join(run("render", "--help").stdout.split())
     for family, entries in FAMILIES.items():
-        assert f"--{family}[auto|{'|'.join(entries)}]" in text
+        assert f"--{family}[{'|'.join([*automatic(family), *entries])}]" in text
         for choice in entries.values():
             assert "".join(choice.summary.split()) in text
 

@@ -2,6 +2,7 @@
 #ifndef CLVOL_TRACKING_COLLISION_H
 #define CLVOL_TRACKING_COLLISION_H
 #include "tracking/interface.h"
+#include "tracking/record.h"
 
 typedef struct {
     float t;           /* out: ray parameter of the collision */
@@ -14,6 +15,7 @@ INLINE bool real_collision(float t, Tally *tally, Collision *collision)
 {
     tally->real += 1;
     collision->t = t;
+    RECORD_REAL(t, collision->beta, tally);
     return true;
 }
 

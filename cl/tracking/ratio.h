@@ -16,6 +16,7 @@ INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream
         const uint2 k = stream_pair(stream);
         if (!transmittance_survives(&transmittance, k.x))
             return (Extinction)(0.0f);
+        RECORD_ESTIMATE(stretch_t(&flight.stretch), transmittance, tally);
         flight.depth = exponential_variate(k.y);
     }
     return transmittance;

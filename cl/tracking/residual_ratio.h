@@ -38,6 +38,7 @@ INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream
             const uint2 k = stream_pair(stream);
             if (!transmittance_survives(&transmittance, k.x))
                 return (Extinction)(0.0f);
+            RECORD_ESTIMATE(stretch_t(&stretch), transmittance * exp_of_minus(control_depth), tally);
             if (--budget == 0) {
                 tally->exhausted += 1;
                 return (Extinction)(0.0f);
@@ -48,6 +49,7 @@ INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream
         pay_control(&transmittance, &control_depth);
         if (!transmittance_survives(&transmittance, stream_pair(stream).x))
             return (Extinction)(0.0f);
+        RECORD_ESTIMATE(walk.t_end, transmittance * exp_of_minus(control_depth), tally);
     }
     return transmittance * exp_of_minus(control_depth);
 }

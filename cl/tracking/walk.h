@@ -6,6 +6,7 @@
 #define CLVOL_TRACKING_WALK_H
 #include "tracking/interface.h"
 #include "tracking/probability.h"
+#include "tracking/record.h"
 
 /* The part of a ray inside one cell, and where on it the walk stands. */
 typedef struct {
@@ -33,6 +34,7 @@ INLINE bool next_tentative(Stretch *stretch, float *depth, Tally *tally)
     }
     stretch->t += *depth / stretch->rate;
     tally->tentative += 1;
+    RECORD_TENTATIVE(stretch->begin + stretch->t, stretch->rate, tally);
     return true;
 }
 
@@ -42,10 +44,12 @@ INLINE Extinction extinction_at(const MediumRay *in, float3 p, Stream *stream, T
     __global const Volume *volume = in->scene->volumes + in->medium->sigma_t_volume;
     tally->lookups += 1;
 #if CLVOL_EXTINCTION == 3 && CLVOL_HAS_COLOURED_VOLUME
-    return in->scale * density3(in->scene, volume, p, stream);
+    const Extinction sigma_t = in->scale * density3(in->scene, volume, p, stream);
 #else
-    return in->scale * density(in->scene, volume, p, in->channel, stream);
+    const Extinction sigma_t = in->scale * density(in->scene, volume, p, in->channel, stream);
 #endif
+    RECORD_LOOKUP(in, p, sigma_t, tally);
+    return sigma_t;
 }
 
 /* sigma_t where the stretch, or the flight, stands. */

@@ -29,6 +29,7 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
         }
         beta *= (sigma_n / majorant) * ((real + null) / null);
         tally->weight = max_of(tally->weight, spectrum_max(beta));
+        RECORD_NULL(beta, tally);
         flight.depth = exponential_variate(k.y);
     }
     collision->beta = beta;

@@ -41,6 +41,7 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
         }
         beta *= (sigma_n / majorant) * ((real + null) / null);
         tally->weight = max_of(tally->weight, spectrum_max(beta));
+        RECORD_NULL(beta, tally);
         flight.depth = exponential_variate(stream_pair(stream).x);
     }
     collision->beta = beta;

@@ -1,0 +1,47 @@
+/* What trackers see along one ray: sigma_t at even steps, (channels, points), and, of a majorant that they walk,
+   each cell's stretch, bound and controls (t, t_end, majorant, control (3), residual control (3), its rate). */
+#include "ray/given.h"
+
+#define CELL_SIZE 10u
+
+__kernel void tables(CLVOL_ARGUMENTS, __global const float *given, __global float *sigma, __global float *cells,
+                     __global uint *cell_count, uint points, uint channels, uint capacity)
+{
+    const Scene scene = CLVOL_SCENE;
+    const uint i = get_global_id(0);
+    if (i < points)
+        for (uint c = 0; c < channels; ++c) {
+            MediumRay in = given_ray(&scene, given);
+            const float t = ((float)i + 0.5f) * (in.t_max / (float)points);
+            const float scale = in.medium->sigma_t[c] * given[7];
+#if CLVOL_HAS_HETEROGENEOUS
+            __global const Volume *volume = scene.volumes + in.medium->sigma_t_volume;
+            if (!is_homogeneous(in.medium))
+                sigma[c * points + i] = scale * volume_value(&scene, volume, in.ray.o + t * in.ray.d, (int)c);
+            else
+#endif
+                sigma[c * points + i] = scale;
+        }
+#ifdef WALKS_MAJORANT
+    if (i > 0)
+        return;
+    const MediumRay in = given_ray(&scene, given);
+    MajorantWalk walk = majorant_begin(&in);
+    uint n = 0;
+    for (; n < capacity && majorant_next(&in, &walk); ++n) {
+        __global float *cell = cells + n * CELL_SIZE;
+        cell[0] = walk.t;
+        cell[1] = walk.t_end;
+        cell[2] = walk.majorant;
+#ifdef HAS_CONTROLS
+        vstore3((float3)(cell_extinction(&in, cell_row(&in, scene.controls, walk.cell, 0))), 0, cell + 3);
+#endif
+#ifdef HAS_RESIDUALS
+        __global const float *row = cell_row(&in, scene.residuals, walk.cell, 1);
+        vstore3((float3)(cell_extinction(&in, row)), 0, cell + 6);
+        cell[9] = in.rate * row[CLVOL_DENSITY_CHANNELS];
+#endif
+    }
+    *cell_count = n;
+#endif
+}

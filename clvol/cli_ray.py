@@ -1,0 +1,151 @@
+"""`clvol ray`: what techniques do along one camera ray, as a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import click
+
+from clvol.cli_options import Definition, ExplainedCommand, RegistryChoice, finite
+
+EXAMPLES = """
+\b
+Examples:
+  clvol ray scenes/cloud.xml 64 64
+  clvol ray scenes/smoke.xml 180 120 --techniques delta,spectral,regular -o ray.svg
+  clvol ray scenes/cloud.xml 40 70 --techniques delta,decomposition --majorant kdtree -o ray.png -o ray.json
+  clvol ray scenes/cloud.xml 64 64 --transmittances ratio,residual-ratio --control min -o transmittance.pdf
+"""
+WATCHED = ("technique", "transmittance")
+CHANNELS = ("red", "green", "blue")
+UNUSED = ("sampler",)
+"""Families that decide nothing inside a medium: walks here have independent numbers of their own."""
+
+
+class Names(RegistryChoice):
+    """Several names of one family, with commas between them."""
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        """How the list stands in --help."""
+        return "NAME,…"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The names as a tuple; OptionError where one is unknown."""
+        if not isinstance(value, str):
+            return value
+        names = [name.strip() for name in value.split(",")]
+        return tuple(super(Names, self).convert(name, param, ctx) for name in names)
+
+
+def _other_families(command: Any) -> Any:
+    """An option for each family that a walk depends on."""
+    from clvol.registry import FAMILIES, FAMILY_PURPOSE
+
+    for family in reversed([f for f in FAMILIES if f not in (*WATCHED, *UNUSED)]):
+        option = click.option(
+            f"--{family}", type=RegistryChoice(family), default="auto", help=FAMILY_PURPOSE[family]
+        )
+        command = option(command)
+    return command
+
+
+@click.command("ray", cls=ExplainedCommand, epilog=EXAMPLES)
+@click.argument("scene", metavar="SCENE")
+@click.argument("x", type=int, metavar="X")
+@click.argument("y", type=int, metavar="Y")
+@click.option(
+    "-o",
+    "--output",
+    "outputs",
+    metavar="FILE",
+    multiple=True,
+    help="Figure to write, .png, .svg or .pdf, or the numbers, .json; ray.png by default.",
+)
+@click.option(
+    "--techniques",
+    "--technique",
+    type=Names("technique"),
+    help="How collisions are sampled; three that differ by default.",
+)
+@click.option(
+    "--transmittances",
+    "--transmittance",
+    type=Names("transmittance"),
+    help="How transmittance is estimated; ratio,residual-ratio by default.",
+)
+@_other_families
+@click.option(
+    "--majorant-scale",
+    type=click.FloatRange(min=0, min_open=True),
+    default=1.0,
+    callback=finite,
+    metavar="FACTOR",
+    help="Multiply every bound of the density, for experiments.",
+)
+@click.option(
+    "--step",
+    type=click.FloatRange(min=0, min_open=True),
+    callback=finite,
+    metavar="LENGTH",
+    help="Step of ray marching; the edge of a voxel by default.",
+)
+@click.option("--channel", type=click.Choice(CHANNELS), help="The most attenuated by default.")
+@click.option("--walks", type=click.IntRange(1, 100), default=6, help="Walks shown one by one; 6 by default.")
+@click.option("--seed", type=click.IntRange(min=0), help="Same seed, same walks; the scene's own by default.")
+@click.option("--device", metavar="PATTERN", help="Part of the device's name; see clvol devices.")
+@click.option(
+    "-D",
+    "definitions",
+    type=Definition(),
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Fill $NAME in the scene.",
+)
+@click.option("--quiet", is_flag=True, help="No progress bar and no summary.")
+def ray(
+    scene: str,
+    x: int,
+    y: int,
+    outputs: tuple[str, ...],
+    channel: str | None,
+    definitions: tuple[tuple[str, str], ...],
+    quiet: bool,
+    **options: Any,
+) -> None:
+    """Draw what techniques do along the camera ray through the centre of pixel X, Y of SCENE.
+
+    Pixels count from 0, from the left and from the top.  The walks are those of a render, by the same device
+    functions, in the first medium that the ray enters.
+    """
+    import clvol
+    from clvol.ray.trace import trace_ray
+    from clvol.ray.view import check_output
+
+    outputs = outputs or ("ray.png",)
+    for output in outputs:
+        check_output(output)
+    loaded = clvol.load_file(scene, **dict(definitions))
+    number = None if channel is None else CHANNELS.index(channel)
+    with _bar(quiet) as progress:
+        view = trace_ray(loaded, x, y, channel=number, progress=progress, **options)
+        for output in outputs:
+            view.save(output)
+    if not quiet:
+        click.echo("\n".join([", ".join(outputs), *view.summary()]))
+
+
+@contextmanager
+def _bar(quiet: bool) -> Iterator[Callable[[int, int, str], None] | None]:
+    """A progress bar on standard error, with the time left."""
+    if quiet:
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("loading", total=None)
+        yield lambda done, total, what: bar.update(task, completed=done, total=total, description=what)

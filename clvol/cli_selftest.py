@@ -1,0 +1,165 @@
+"""`clvol selftest`: does every way to render a scene make the same picture?"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import click
+
+from clvol.cli_options import Definition, finite
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from clvol.judgement import Tested
+    from clvol.selftesting import SelfTest
+
+EXAMPLES = """
+\b
+Examples:
+  clvol selftest scenes/cloud.xml
+  clvol selftest scenes/smoke.xml --quick
+  clvol selftest scenes/room.xml --time 600 --alpha 1e-6
+
+Exits with 0 where all agree, 1 where one disagrees or is faulty, 2 for a mistake.
+"""
+
+
+@click.command(epilog=EXAMPLES)
+@click.argument("scene", metavar="SCENE")
+@click.option("--quick", is_flag=True, help="Fewer combinations on a smaller film: about a minute.")
+@click.option(
+    "--time",
+    "seconds",
+    type=click.FloatRange(min=0, min_open=True),
+    callback=finite,
+    metavar="SECONDS",
+    help="Render for so long, the building of kernels apart; 120 by default, 20 with --quick.",
+)
+@click.option(
+    "--alpha",
+    type=click.FloatRange(0, 1, min_open=True, max_open=True),
+    default=1e-4,
+    show_default=True,
+    help="Probability of accusing any combination of a sound scene.",
+)
+@click.option(
+    "--seed", type=click.IntRange(0, 2**64 - 1), default=0, show_default=True, help="Same seed, same samples."
+)
+@click.option("--device", metavar="PATTERN", help="Part of the device's name; see clvol devices.")
+@click.option(
+    "-D",
+    "definitions",
+    type=Definition(),
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Fill $NAME in the scene.",
+)
+def selftest(
+    scene: str,
+    quick: bool,
+    seconds: float | None,
+    alpha: float,
+    seed: int,
+    device: str | None,
+    definitions: tuple[tuple[str, str], ...],
+) -> None:
+    """Test that every way to render SCENE makes the same picture of it.
+
+    Techniques, transmittances, majorants, look-ups and all other unbiased choices that the scene has a use
+    for are rendered at a small size, in combinations that leave none out, each against all others: their
+    tiles and their means. Says the smallest bias that would have been seen.
+    """
+    from rich.console import Console
+
+    import clvol
+    from clvol.selftesting import selftest as run
+
+    loaded = clvol.load_file(scene, **dict(definitions))
+    with _Steps(Console(stderr=True)) as steps:
+        found = run(
+            loaded, quick=quick, seconds=seconds, alpha=alpha, seed=seed, device=device, progress=steps.tell
+        )
+    console = Console()
+    if not console.is_terminal:  # a file or a pipe has no width to keep to
+        console = Console(width=200)
+    console.print(table_of(found))
+    console.print(*notes(found), sep="\n", highlight=False, markup=False, soft_wrap=True)
+    click.get_current_context().exit(0 if found.passed else 1)
+
+
+class _Steps:
+    """A progress bar with the time left on standard error; silent where that is no terminal."""
+
+    def __init__(self, console: Console) -> None:
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+        self._bar = Progress(*columns, console=console, disable=not console.is_terminal, transient=True)
+        self._tasks: dict[str, int] = {}
+
+    def __enter__(self) -> _Steps:
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        self._bar.stop()
+
+    def tell(self, what: str, done: int, total: int) -> None:
+        """Show how far `what` is."""
+        if what not in self._tasks:
+            self._tasks[what] = self._bar.add_task(what, total=total)
+        self._bar.update(self._tasks[what], completed=done, total=total)
+
+
+def table_of(found: SelfTest) -> Table:
+    """A row for each combination."""
+    from rich.table import Table
+
+    families = [f for f in found.tested[0].names if len({t.names[f] for t in found.tested}) > 1]
+    table = Table(title_justify="left")
+    for family in families:
+        table.add_column(family)
+    for name in ("mean", "p", "sees a bias of"):
+        table.add_column(name, justify="right")
+    table.add_column("verdict")
+    for one in found.tested:
+        table.add_row(*(one.names[f] for f in families), *_figures(one, len(found.tested)), _word(one))
+    return table
+
+
+def _figures(one: Tested, count: int) -> tuple[str, str, str]:
+    mean = f"{one.images.mean():.5g}"
+    if one.agreement is None:
+        return mean, "-", "-"
+    bias = one.agreement.smallest_bias
+    seen = f"{100 * bias:.2g} %" if math.isfinite(bias) else "-"
+    return mean, f"{min(1.0, one.agreement.p * count):.2g}", seen
+
+
+def _word(one: Tested) -> str:
+    words = [] if one.agrees else ["DISAGREES"]
+    words += ["undecided"] if one.doubtful else []
+    words += [f"FAULTY: {fault}" for fault in one.faults]
+    return "; ".join(words) or "agrees"
+
+
+def notes(found: SelfTest) -> list[str]:
+    """How it was tested, and the verdict."""
+    width, height = found.size
+    left_out = f"; left out as biased: {', '.join(found.left_out)}" if found.left_out else ""
+    return [
+        f"{width} x {height} pixels, {found.rounds} rounds of {found.spp} samples each, "
+        f"{found.seconds:.0f} seconds; every choice occurs, and {found.pairs} of {found.all_pairs} pairs of "
+        f"choices{left_out}.",
+        "p: of the greatest deviation from all others, of tiles and means, adjusted for everything tested; "
+        f"an accusation of a sound scene has probability {found.alpha:g} at most.",
+        *(
+            f"{one.options}: weights grew to {one.largest_weight:.2g}; it is noisier than its rounds show."
+            for one in found.tested
+            if one.heavy
+        ),
+        found.verdict,
+    ]

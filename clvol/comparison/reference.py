@@ -1,0 +1,153 @@
+"""What combinations are compared with: a picture whose own error is known."""
+
+from __future__ import annotations
+
+import logging
+import os
+from dataclasses import dataclass
+
+import numpy as np
+
+from clvol.errors import OptionError
+from clvol.scene.digest import scene_digest
+from clvol.scene.records import Scene
+
+log = logging.getLogger("clvol")
+_STAND_INS = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A picture near the truth.
+
+    Parameters
+    ----------
+    image, variance : float64 (height, width, 3)
+        Mean radiance and the variance of that mean.
+    rounds : float32 (rounds, height, width, 3)
+        Independent pictures whose mean it is.
+    spp : samples per pixel in all; None where that is not known.
+    source : how it was made, in words.
+    variance_known : whether the variance was measured; if not it is 0, and errors look larger than they are.
+    seeds : first and last that it was rendered with, None where that is not known.
+    """
+
+    image: np.ndarray
+    variance: np.ndarray
+    rounds: np.ndarray
+    spp: int | None
+    source: str
+    variance_known: bool = True
+    seeds: tuple[int, int] | None = None
+
+    @classmethod
+    def of_rounds(
+        cls, rounds: np.ndarray, spp: int, source: str, seeds: tuple[int, int] | None = None
+    ) -> Reference:
+        """The mean of independent rounds of `spp` samples each; its variance is the one between them."""
+        mean = rounds.mean(axis=0, dtype=np.float64)
+        variance = rounds.var(axis=0, ddof=1, dtype=np.float64) / len(rounds)
+        return cls(mean, variance, rounds, spp * len(rounds), source, seeds=seeds)
+
+    @property
+    def product_error(self) -> float:
+        """Standard error that its own error leaves in mean squared errors, after subtracting the variance."""
+        count = len(self.rounds)
+        squares = ((self.rounds - self.image) ** 2).mean(axis=(1, 2, 3), dtype=np.float64)
+        pixels = np.sqrt(2 * (self.variance**2).sum()) / self.variance.size
+        if squares.sum() == 0:
+            return 0.0
+        spread = float(squares.std(ddof=1) / squares.mean()) * float(self.variance.mean())
+        return max(spread, float(pixels)) * np.sqrt(1 + 1 / count)
+
+
+def read_reference(path: str | os.PathLike[str], scene: Scene) -> Reference:
+    """A picture that `Result.save` wrote, or any .exr of the film's size with channels R, G, B.
+
+    Without channels variance.R, variance.G, variance.B its error is taken to be 0, with a warning; warnings
+    too where its metadata name another scene or a biased choice.
+
+    Raises
+    ------
+    OptionError : a file that cannot be read, of another size, without colours, or with values not finite.
+    """
+    where = os.fspath(path)
+    planes, metadata = _read_planes(where)
+    missing = [name for name in "RGB" if name not in planes]
+    if missing:
+        raise OptionError(f"has no channel {', '.join(missing)}", where=where, hint="give a linear RGB .exr")
+    image = np.stack([planes[name] for name in "RGB"], axis=-1).astype(np.float64)
+    size = tuple(scene.film.window[2:])
+    if image.shape[1::-1] != size:
+        raise OptionError(
+            f"is {image.shape[1]} x {image.shape[0]} pixels, the scene's film {size[0]} x {size[1]}",
+            where=where,
+            hint="render it with the same -D, or give -D to match it",
+        )
+    known = all(f"variance.{name}" in planes for name in "RGB")
+    variance = np.zeros_like(image)
+    if known:
+        variance = np.stack([planes[f"variance.{name}"] for name in "RGB"], axis=-1).astype(np.float64)
+    if not (np.isfinite(image).all() and np.isfinite(variance).all() and (variance >= 0).all()):
+        raise OptionError(
+            "has pixels or variances that are not finite", where=where, hint="render it with 2 spp or more"
+        )
+    _warn_of_doubts(where, metadata, known, scene)
+    return Reference(
+        image,
+        variance,
+        _stand_ins(image, variance),
+        int(metadata["spp"]) if "spp" in metadata else None,
+        f"given: {os.path.basename(where)}",
+        known,
+        _seeds(metadata),
+    )
+
+
+def _read_planes(where: str) -> tuple[dict[str, np.ndarray], dict[str, object]]:
+    """Channels (height, width) by name, and the metadata."""
+    import OpenImageIO as oiio  # noqa: N813
+
+    if not where.lower().endswith(".exr"):
+        raise OptionError("a reference is an .exr", where=where, hint="clvol render SCENE -o reference.exr")
+    if not os.path.isfile(where):
+        raise OptionError("no such file", where=where)
+    opened = oiio.ImageInput.open(where)
+    if opened is None:
+        raise OptionError("cannot be read as a picture", where=where, hint=oiio.geterror())
+    spec = opened.spec()
+    pixels = opened.read_image(0, 0, 0, spec.nchannels, oiio.FLOAT)
+    reason = opened.geterror()
+    opened.close()
+    if pixels is None:
+        raise OptionError("cannot be read to its end", where=where, hint=reason)
+    names = list(spec.channelnames)
+    pixels = np.asarray(pixels).reshape(spec.height, spec.width, len(names))
+    metadata = {attribute.name: attribute.value for attribute in spec.extra_attribs}
+    return {name: pixels[..., n] for n, name in enumerate(names)}, metadata
+
+
+def _seeds(metadata: dict[str, object]) -> tuple[int, int] | None:
+    """First and last seed: "seed" of a render, "seeds" of an earlier comparison's reference."""
+    words = str(metadata.get("seeds", metadata.get("seed", ""))).split()
+    return (int(words[0]), int(words[-1])) if words and all(w.isdigit() for w in words) else None
+
+
+def _warn_of_doubts(where: str, metadata: dict[str, object], known: bool, scene: Scene) -> None:
+    if not known:
+        log.warning(
+            "%s has no variance channels: its own error cannot be subtracted, and counts as everyone's", where
+        )
+    if "digest" in metadata and metadata["digest"] != scene_digest(scene):
+        log.warning("%s was made of another scene, or with other -D", where)
+    if metadata.get("biased"):
+        log.warning("%s is biased itself (%s)", where, metadata["biased"])
+
+
+def _stand_ins(image: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    """Rounds that have exactly this mean and this variance of the mean: what a test between stacks takes
+    when the rounds themselves are gone."""
+    noise = np.random.default_rng(1).standard_normal((_STAND_INS, *image.shape))
+    noise -= noise.mean(axis=0)
+    noise *= np.sqrt(variance * _STAND_INS) / noise.std(axis=0, ddof=1)
+    return (image + noise).astype(np.float32)

@@ -1,0 +1,199 @@
+"""A comparison in words: sentences for the report, and the table that a terminal shows."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from clvol.comparison.figures import COSTS, LEVEL, Comparison, Efficiency, Figures
+from clvol.efficiency import Interval
+
+_HEAVY = 0.5
+"""A round with more of the squared error than this, and than four times its share, is not like the others."""
+
+
+@dataclass(frozen=True)
+class Sentence:
+    """kind : "finding", "verdict" or "warning"."""
+
+    kind: str
+    text: str
+
+
+def times(interval: Interval) -> str:
+    """A ratio with its interval: "2.31 (2.05 to 2.60)"; "unknown" where it is."""
+    if not math.isfinite(interval.value):
+        return "unknown"
+    return f"{interval.value:.3g} ({interval.low:.3g} to {interval.high:.3g})"
+
+
+def sentences(comparison: Comparison) -> list[Sentence]:
+    """Everything that a reader should know, the most important first."""
+    found = [Sentence("finding", text) for cost in COSTS for text in _efficiency(comparison, cost)]
+    for figures in comparison.figures:
+        found += [Sentence("verdict", _verdict(figures)), Sentence("verdict", _slope(figures))]
+    return found + [Sentence("warning", text) for text in _warnings(comparison)]
+
+
+def _efficiency(comparison: Comparison, cost: str) -> Iterator[str]:
+    known = {f.label: f.efficiency[cost] for f in comparison.figures if cost in f.efficiency}
+    if not known:
+        return
+    base = comparison.baseline
+    others = {label: e for label, e in known.items() if label != base}
+    for label, e in sorted(others.items(), key=lambda item: -item[1].ratio.value):
+        yield f"By {COSTS[cost]}, {label} is {_said(e)} as efficient as {base}{_significance(e)}."
+    if len(others) > 1 and any(math.isfinite(e.adjusted_p) for e in others.values()):
+        yield (
+            f"Significant by {COSTS[cost]} means that the chance of calling any of these {len(others)} "
+            f"wrongly different from {base} is {LEVEL:.0%} (Holm's correction); intervals are 95 % each."
+        )
+
+
+def _said(e: Efficiency) -> str:
+    return f"{times(e.ratio)} times"
+
+
+def _significance(e: Efficiency) -> str:
+    if not math.isfinite(e.adjusted_p):
+        return ": not known, for want of a measurable error or cost"
+    p = "p < 0.0001" if e.adjusted_p < 1e-4 else f"p = {e.adjusted_p:.2g}"
+    if e.significant:
+        return f": significantly {'more' if e.ratio.value > 1 else 'less'} ({p})"
+    return f": no significant difference ({p})"
+
+
+def _verdict(figures: Figures) -> str:
+    verdict = figures.verdict
+    if not verdict.agrees:
+        blame = (
+            "as its label says"
+            if figures.biased
+            else "though neither should be biased, so that one is wrong (clvol selftest)"
+        )
+        return f"{figures.label} differs from the reference, {blame}: {verdict.explanation}."
+    label = ", labelled as biased," if figures.biased else ""
+    return f"{figures.label}{label} agrees with the reference: {verdict.explanation}."
+
+
+def _slope(figures: Figures) -> str:
+    label, slope = figures.label, figures.slope
+    if not math.isfinite(slope.value):
+        return f"{label}: the slope of its error is unknown, the error is too near the reference's."
+    low = f"{slope.low:.2f}" if math.isfinite(slope.low) else "-∞"
+    band = f"{slope.value:.2f} ({low} to {slope.high:.2f})"
+    if slope.low > -1 and figures.verdict.agrees and not figures.biased:
+        return (
+            f"{label}'s MSE falls over time with slope {band}, a little flatter than -1; chance does that a "
+            "few times in a hundred, and the tests against the reference find no bias."
+        )
+    if slope.low > -1:
+        floor = math.sqrt(max(figures.relative_squared_bias, 0.0))
+        return (
+            f"{label} flattens: its MSE falls over time with slope {band} where noise alone has -1; more "
+            f"samples do not bring its relative RMSE below about {floor:.2g}, which is bias."
+        )
+    if slope.high < -1:
+        return f"{label}'s MSE falls over time with slope {band}, faster than independent samples' -1."
+    hidden = (
+        ", so that its bias hides in its noise here" if figures.biased else ", as noise without bias does"
+    )
+    return f"{label}'s MSE falls over time with slope {band}, compatible with -1{hidden}."
+
+
+def _warnings(comparison: Comparison) -> Iterator[str]:
+    if comparison.interrupted:
+        count = len(comparison.figures[0].seconds)
+        yield f"Interrupted: only the {count} rounds that were complete are in this report."
+    for said, why in comparison.left_out:
+        yield f"{said} is left out: {why}."
+    for said, label in comparison.doubles:
+        if said == label:
+            yield f"{label} was asked for in more than one way, and was measured once."
+        else:
+            yield f"{said} comes to the same as {label} on this scene, and was measured once."
+    if not comparison.reference.variance_known:
+        yield (
+            "The reference came without its variance, which could not be subtracted: all errors are too "
+            "large by the same amount, curves flatten, and disagreement with it may be its own noise."
+        )
+    for figures in comparison.figures:
+        share, count = figures.worst_round, len(figures.seconds)
+        if share > max(_HEAVY, 4 / count):
+            yield (
+                f"One round has {share:.0%} of {figures.label}'s squared error: rare bright samples. Its "
+                "interval may be too narrow; measure with more rounds."
+            )
+        if figures.biased:
+            yield (
+                f"{figures.label} is biased: its efficiency is that of a render as long as all its rounds, "
+                "and is less for longer ones."
+            )
+        for note in figures.measured.notes:
+            yield f"{figures.label}: {note}."
+
+
+def table_rows(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
+    """Headings and rows of the summary."""
+    heads = [
+        "combination",
+        "rel. RMSE",
+        "seconds",
+        "look-ups per sample",
+        "efficiency by time",
+        "by look-ups",
+        "slope",
+        "largest error",
+        "agrees",
+    ]
+    rows = []
+    for f in comparison.figures:
+        pixels = f.measured.images[0, ..., 0].size
+        per_sample = float(f.measured.lookups.mean()) / (pixels * f.measured.spp)
+        ratios = [_cell(f, cost, comparison.baseline) for cost in COSTS]
+        slope = f"{f.slope.value:.2f}" if math.isfinite(f.slope.value) else "–"
+        agrees = ("yes" if f.verdict.agrees else "NO") + (" (biased)" if f.biased else "")
+        rows.append(
+            [
+                f.label,
+                f"{math.sqrt(max(f.relmse.value[-1], 0.0)):.3g}",
+                f"{f.seconds[-1]:.3g}",
+                f"{per_sample:.3g}",
+                *ratios,
+                slope,
+                f"{f.largest_error.difference:+.2g}",
+                agrees,
+            ]
+        )
+    return heads, rows
+
+
+def _cell(figures: Figures, cost: str, baseline: str) -> str:
+    if cost not in figures.efficiency:
+        return "–"
+    e = figures.efficiency[cost]
+    if figures.label == baseline:
+        return "1 (baseline)"
+    return times(e.ratio).replace(" to ", "–") + (" *" if e.significant else "")
+
+
+def text_table(comparison: Comparison, width: int = 160) -> str:
+    """The summary as plain text."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    heads, rows = table_rows(comparison)
+    table = Table(box=box.SIMPLE, title=None)
+    for number, head in enumerate(heads):
+        table.add_column(head, justify="left" if number == 0 else "right")
+    for row in rows:
+        table.add_row(*map(Text, row))
+    console = Console(file=io.StringIO(), width=width, color_system=None)
+    console.print(table)
+    note = f"* significantly different from {comparison.baseline}"
+    lines = [line.rstrip() for line in console.file.getvalue().splitlines()]
+    return "\n".join([*(line for line in lines if line), note])

@@ -1,0 +1,29 @@
+"""The same view on a smaller film: what self-tests and pilots render."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from clvol.scene.records import Film, Scene
+
+
+def reduced(scene: Scene, pixels: int) -> Scene:
+    """The scene on a film scaled so that about `pixels` of it are rendered; itself where it is no larger.
+
+    The view, its crop and its shape stay; the pixel filter stays as wide in pixels.
+    """
+    film = scene.film
+    factor = math.sqrt(pixels / (film.window[2] * film.window[3]))
+    return scene if factor >= 1 else replace(scene, film=_scaled(film, factor))
+
+
+def _scaled(film: Film, factor: float) -> Film:
+    width, height = (max(1, round(factor * size)) for size in (film.width, film.height))
+    crop = None
+    if film.crop is not None:
+        x, y = (int(factor * start) for start in film.crop[:2])
+        x, y = min(x, width - 1), min(y, height - 1)
+        size = (max(1, round(factor * extent)) for extent in film.crop[2:])
+        crop = (x, y, *(min(s, room) for s, room in zip(size, (width - x, height - y), strict=True)))
+    return replace(film, width=width, height=height, crop=crop)

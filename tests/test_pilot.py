@@ -1,0 +1,203 @@
+"""`--technique auto:pilot`: what it picks, what it keeps, and that the picture owes its samples nothing.
+
+The search runs on made-up candidates, whose variances and seconds are planted; one small scene runs for real.
+"""
+
+import functools
+import logging
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from pictures import box, gridded, homogeneous, picture, volume
+
+import clvol
+from clvol import pilot as pilots
+from clvol.candidates import Candidate, halve, precomputation, relative_efficiency
+from clvol.choices import Choices, resolve
+from clvol.cli import main
+from clvol.combinations import independent_seeds, unbiased
+from clvol.config import KernelConfig
+from clvol.errors import OptionError
+from clvol.scene.records import ConstantEmitter, DirectionalEmitter
+
+CUBE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+SKY, SUN = ConstantEmitter(), DirectionalEmitter((2.0,), (0.0, -1.0, 0.0))
+
+
+def scene(medium, lights):
+    return picture([box(*CUBE, medium)], lights, (0.4, 0.5, -3.0), (0.5, 0.5, 0.5), 30.0, (16, 16))
+
+
+def lumps(scale=(3.0,)):
+    return gridded(volume(np.random.default_rng(1).random((5, 6, 7)), *CUBE), 0.7, scale=scale)
+
+
+# -- planted efficiencies -----------------------------------------------------------------------------
+
+
+def planted(deviation, seconds, rounds=4, seed=1, extra=0.0):
+    """A candidate with noise of a known deviation."""
+    rng = np.random.default_rng(seed)
+    images = list(rng.normal(1.0, deviation, (rounds, 32, 32, 3)))
+    return Candidate(f"{deviation} {seconds}", None, images, [seconds] * rounds, extra)
+
+
+def test_relative_efficiency_is_that_of_variance_times_seconds():
+    base, quieter, slower = planted(0.2, 1.0, seed=1), planted(0.1, 1.0, seed=2), planted(0.2, 3.0, seed=3)
+    for one, expected in ((quieter, 4.0), (slower, 1 / 3)):
+        found = relative_efficiency(one, base)
+        assert found.low < expected < found.high and found.high / found.low < 1.4
+    assert relative_efficiency(base, base).value == 1.0
+    assert relative_efficiency(planted(0.0, 1.0), planted(0.0, 1.0)).value == 1.0  # black pictures
+
+
+def test_halving_keeps_the_better_half_and_counts_precomputation():
+    a, b, c = planted(0.2, 1.0, seed=1), planted(0.1, 1.0, seed=2), planted(0.2, 0.1, seed=3)
+    assert halve([a, b, c]) == [c, b] and halve([a, b]) == [b]
+    c.extra = 1.0
+    assert halve([a, b, c]) == [b, a]
+
+
+def test_precomputation_counts_in_proportion_to_the_render():
+    assert precomputation(2.0, 0.1, rounds=100.0, limit=None) == pytest.approx(0.02)
+    assert precomputation(2.0, 0.1, rounds=None, limit=4.0) == pytest.approx(0.1)  # half the time is left
+    assert precomputation(5.0, 0.1, rounds=None, limit=4.0) == np.inf
+
+
+FACTORS = {
+    "technique": {"decomposition": 3.0, "regular": 0.05},
+    "transmittance": {"power-series": 2.0, "delta": 0.6},
+    "majorant": {"kdtree": 2.0, "global": 0.7},
+}
+"""Planted efficiencies; 1 for others."""
+
+
+class MadeUpPilot(pilots.Pilot):
+    """A pilot whose candidates are made up: no device, no kernels; seconds are planted, work is counted."""
+
+    factors = FACTORS
+    rendered = 0
+
+    def _open(self, choices):
+        resolved = resolve(self.features, choices.names)
+        majorant = "grid" if choices.majorant == "auto" else choices.majorant
+        config = KernelConfig(self.features, **{**resolved, "majorant": majorant})
+        used = {family: getattr(config, family) for family in pilots.CHOSEN}
+        session = SimpleNamespace(config=config, choices=lambda: used)
+        trial = SimpleNamespace(session=session, choices=choices, names=used, precompute_seconds=0.0)
+        candidate = Candidate(" + ".join(used.values()), trial)
+        efficiency = np.prod([self.factors[f].get(n, 1.0) for f, n in used.items()])
+
+        def render(seed, spp):
+            rng = np.random.default_rng(seed)
+            candidate.images.append(rng.normal(1.0, 0.1, (16, 16, 3)))
+            candidate.seconds.append(0.02 / efficiency)
+            self.__class__.rendered += 1
+
+        candidate.render = render
+        self.candidates.append(candidate)
+        return candidate
+
+    def _fits(self, candidate):
+        return True
+
+
+def made_up(choices, medium=None, factors=FACTORS):
+    lit = scene(medium or lumps(), (SKY, SUN))
+    kind = type("Made", (MadeUpPilot,), {"factors": factors})
+    run = kind(None, lit, choices, independent_seeds(0, "pilot"), 64, None, None, True)
+    return run.found(), run
+
+
+@functools.cache
+def run_of_autos():
+    return made_up(Choices())
+
+
+def test_the_most_efficient_combination_is_found():
+    found, run = run_of_autos()
+    assert found.names == {
+        "technique": "decomposition",
+        "transmittance": "power-series",
+        "majorant": "kdtree",
+    }
+    assert found.relative.low < 12 < found.relative.high
+    labels = [candidate.label for candidate in run.candidates]
+    assert len(set(labels)) == len(labels)
+    assert not any("spectral" in label for label in labels)  # a grey scene: its kernels are weighted-delta's
+
+
+def test_a_hopeless_candidate_costs_one_round():
+    _, run = run_of_autos()
+    hopeless = [c for c in run.candidates if c.label.startswith("regular")]
+    assert [len(c.seconds) for c in hopeless] == [1]
+
+
+def test_the_pilot_is_short():
+    """Every family's candidates once, then half of them: less than twice their number, in each family."""
+    _, run = run_of_autos()
+    counts = [len(unbiased(family)) for family in pilots.CHOSEN]
+    assert type(run).rendered <= 1 + pilots.ROUNDS * sum(2 * count + 3 for count in counts)
+    assert run.seconds <= run.budget * 1.5
+
+
+def test_what_was_given_is_kept():
+    found, run = made_up(Choices(transmittance="ratio", majorant="global"))
+    assert found.names == {"technique": "decomposition", "transmittance": "ratio", "majorant": "global"}
+    assert {c.trial.names["majorant"] for c in run.candidates} == {"global"}
+    assert {c.trial.names["transmittance"] for c in run.candidates} == {"ratio"}
+
+
+def test_autos_rules_stay_where_nothing_is_clearly_better():
+    found, run = made_up(Choices(), factors={family: {} for family in pilots.CHOSEN})
+    auto = run.candidates[0].label.split(" + ")
+    if found.relative.value == 1.0:
+        assert list(found.names.values()) == auto and "auto's own rules" in found.reason
+    else:
+        assert found.relative.value > pilots.WORTH
+
+
+def test_impossible_combinations_are_no_candidates():
+    _, run = made_up(Choices(lookup="stochastic"))
+    assert not any("regular" in c.label for c in run.candidates)
+
+
+# -- a render for real --------------------------------------------------------------------------------
+
+
+def test_the_picture_is_that_of_the_choice_with_the_same_seed(caplog, monkeypatch):
+    """Seconds are planted, so that it is not auto's choice."""
+    told, seeds = [], []
+    original = Candidate.render
+
+    def render(self, seed, spp):
+        seeds.append(seed)
+        original(self, seed, spp)
+        self.seconds[-1] = 1.0 if self.label == "analytic + none + none" else 0.3
+
+    monkeypatch.setattr(Candidate, "render", render)
+    lit = scene(homogeneous(1.0, 0.5), (SKY,))
+    with caplog.at_level(logging.INFO, "clvol"):
+        found = clvol.render(lit, spp=4, seed=9, technique="auto:pilot", progress=told.append)
+    assert [record.what for record in told if record.what == "pilot"]
+    about = found.metadata
+    assert "--seed 9" in about["repeat"] and about["pilot"] in about["repeat"]
+    assert "transmittance" in about["pilot_reason"] and "kernel builds" in about["pilot_reason"]
+    assert about["repeat"] in caplog.text
+    words = about["pilot"].split()
+    assert words[0] == "--transmittance" and words[1] != "none"
+    options = {name.removeprefix("--"): value for name, value in zip(words[::2], words[1::2], strict=True)}
+    again = clvol.render(lit, spp=4, seed=9, **options)
+    assert np.array_equal(found.image, again.image) and np.array_equal(found.variance, again.variance)
+    assert len(set(seeds)) == len(seeds) and 9 not in seeds
+
+
+def test_auto_pilot_is_a_technique_of_renders_alone(tmp_path):
+    with pytest.raises(OptionError, match="unknown technique"):
+        Choices(technique="auto:pilot")
+    with pytest.raises(OptionError, match="unknown majorant"):
+        clvol.render(scene(homogeneous(1.0), (SKY,)), majorant="auto:pilot")
+    text = CliRunner().invoke(main, ["render", "--help"]).output
+    assert "auto|auto:pilot|delta" in text.replace("\n", "").replace(" ", "")
