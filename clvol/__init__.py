@@ -23,7 +23,7 @@ _EXPORTS = {
     "rotate": "clvol.scene",
     "scale": "clvol.scene",
     "Scene": "clvol.scene.records",
-    "selftest": "clvol.selftesting",
+    "selftest": "clvol.measure.selftests",
     "trace_ray": "clvol.ray.trace",
     "translate": "clvol.scene",
 }

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from clvol.judgement import Tested
-    from clvol.selftesting import SelfTest
+    from clvol.measure.judgement import Tested
+    from clvol.measure.selftests import SelfTest
 
 EXAMPLES = """
 \b
@@ -75,7 +75,7 @@ def selftest(
     from rich.console import Console
 
     import clvol
-    from clvol.selftesting import selftest as run
+    from clvol.measure.selftests import selftest as run
 
     loaded = clvol.load_file(scene, **dict(definitions))
     with _Steps(Console(stderr=True)) as steps:

@@ -123,7 +123,7 @@ def _piloted(
     callback: ProgressCallback | None,
 ) -> tuple[Choices, dict[str, str]]:
     """What a pilot makes of `choices`, and what the metadata say of it."""
-    from clvol.pilot import pilot
+    from clvol.measure.pilot import pilot
 
     started = time.perf_counter()
 

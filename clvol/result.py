@@ -21,7 +21,9 @@ from clvol.estimate import Estimate, error_bias
 Ranges = tuple[tuple[int, int], ...]
 """Sample ranges as (first, count), ascending, disjoint, not touching."""
 
-_PER_RUN = frozenset({"spp", "samples", "seconds", "device", "time_limit", "interrupted"})
+_PER_RUN = frozenset(
+    {"spp", "samples", "seconds", "device", "time_limit", "interrupted", "pilot", "pilot_reason", "repeat"}
+)
 """Metadata that may differ between results that merge; everything else must agree."""
 
 _LARGEST = ("largest", "peak", "bytes", "slots", "pool")

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from clvol.agreement import agreement
 from clvol.errors import OptionError
+from clvol.measure.agreement import agreement
 
 ALPHA, TRIES = 0.01, 300
 MOST_ALARMS = stats.binom.isf(1e-4, TRIES, ALPHA)

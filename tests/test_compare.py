@@ -23,11 +23,11 @@ from clvol.comparison.names import names_asked, plural
 from clvol.comparison.reference import Reference, read_reference
 from clvol.comparison.report import as_json, check_folder, write_report
 from clvol.comparison.words import _slope
-from clvol.efficiency import Interval, Work, compare_efficiency, error_products
 from clvol.errors import OptionError
 from clvol.image_io import split_channels, write_exr
+from clvol.measure.efficiency import Interval, Work, compare_efficiency, error_products
+from clvol.measure.trials import Trial
 from clvol.registry import FAMILIES
-from clvol.trials import Trial
 
 FALSE_ALARM = 1e-4
 SIZE = 16

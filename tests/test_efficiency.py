@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from clvol.efficiency import (
+from clvol.measure.efficiency import (
     Work,
     compare_efficiency,
     convergence,

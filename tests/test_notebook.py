@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio  # noqa: N813
 
-from clvol.image_io import tone_map
 from clvol.estimate import Moments
+from clvol.image_io import tone_map
 from clvol.result import Result
 
 ROOT = Path(__file__).resolve().parent.parent

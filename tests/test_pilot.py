@@ -13,13 +13,13 @@ from click.testing import CliRunner
 from pictures import box, gridded, homogeneous, picture, volume
 
 import clvol
-from clvol import pilot as pilots
-from clvol.candidates import Candidate, halve, precomputation, relative_efficiency
 from clvol.choices import Choices, resolve
 from clvol.cli import main
-from clvol.combinations import independent_seeds, unbiased
 from clvol.config import KernelConfig
 from clvol.errors import OptionError
+from clvol.measure import pilot as pilots
+from clvol.measure.candidates import Candidate, halve, precomputation, relative_efficiency
+from clvol.measure.combinations import independent_seeds, unbiased
 from clvol.scene.records import ConstantEmitter, DirectionalEmitter
 
 CUBE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)

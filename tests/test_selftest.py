@@ -10,16 +10,17 @@ from pictures import box, gridded, homogeneous, picture, volume
 from scipy import stats
 
 import clvol
-from clvol import judgement, programs
+from clvol import programs
 from clvol.cli import main
-from clvol.combinations import KEYS, covering, in_force, independent_seeds, unbiased, usable
 from clvol.errors import OptionError
 from clvol.features import Features
-from clvol.judgement import common_choice, judge
-from clvol.reduced import reduced
+from clvol.measure import judgement
+from clvol.measure.combinations import KEYS, covering, in_force, independent_seeds, unbiased, usable
+from clvol.measure.judgement import common_choice, judge
+from clvol.measure.reduced import reduced
+from clvol.measure.selftests import SelfTest
 from clvol.registry import FAMILIES
 from clvol.scene.records import ConstantEmitter, DirectionalEmitter, Film
-from clvol.selftesting import SelfTest
 
 CUBE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 SKY, SUN = ConstantEmitter(), DirectionalEmitter((2.0,), (0.0, -1.0, 0.0))

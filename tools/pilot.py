@@ -12,12 +12,12 @@ from pathlib import Path
 import click
 from rich.progress import track
 
-from clvol.candidates import Candidate, Relative, inverse_efficiency, relative_efficiency
 from clvol.choices import Choices
-from clvol.combinations import independent_seeds
 from clvol.device import open_device
-from clvol.pilot import Found, Pilot
-from clvol.quiet import quiet_renders
+from clvol.measure.candidates import Candidate, Relative, inverse_efficiency, relative_efficiency
+from clvol.measure.combinations import independent_seeds
+from clvol.measure.pilot import Found, Pilot
+from clvol.measure.quiet import quiet_renders
 from clvol.scene import load_file
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -1,8 +1,8 @@
 """Speed against error on a user's own scene: combinations of choices, measured by turns, and the report.
 
 names.py and combine.py say what is compared, measure.py renders it, figures.py makes numbers of it, words.py
-sentences, plots.py pictures, report.py a folder.  The statistics are in `clvol.efficiency` and
-`clvol.agreement`.  Names are imported when first used, so that the command line stays quick.
+sentences, plots.py pictures, report.py a folder.  The statistics are in `clvol.measure.efficiency` and
+`clvol.measure.agreement`.  Names are imported when first used, so that the command line stays quick.
 """
 
 from importlib import import_module

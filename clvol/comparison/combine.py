@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from clvol.choices import Choices
 from clvol.device import Device
 from clvol.errors import OptionError
+from clvol.measure.trials import Trial
 from clvol.registry import FAMILIES
 from clvol.scene.records import Scene
-from clvol.trials import Trial
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,11 +19,11 @@ from clvol.comparison.measure import Measured, Plan, Told, measure
 from clvol.comparison.names import names_asked
 from clvol.comparison.reference import Reference, read_reference
 from clvol.device import Device, open_device
-from clvol.efficiency import LEAST_ROUNDS
 from clvol.errors import OptionError
+from clvol.measure.efficiency import LEAST_ROUNDS
+from clvol.measure.trials import Trial
 from clvol.scene.digest import scene_digest
 from clvol.scene.records import Scene
-from clvol.trials import Trial
 from clvol.version import __version__
 
 DEFAULT_SECONDS = 10.0

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from clvol.agreement import Agreement, agreement
 from clvol.comparison.measure import Measured
 from clvol.comparison.reference import Reference
-from clvol.efficiency import (
+from clvol.measure.agreement import Agreement, agreement
+from clvol.measure.efficiency import (
     Interval,
     Work,
     compare_efficiency,

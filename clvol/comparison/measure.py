@@ -14,9 +14,9 @@ import numpy as np
 
 from clvol.comparison.combine import Lineup
 from clvol.comparison.reference import Reference
-from clvol.efficiency import LEAST_ROUNDS
+from clvol.measure.efficiency import LEAST_ROUNDS
+from clvol.measure.trials import Trial, rounds
 from clvol.result import Result
-from clvol.trials import Trial, rounds
 
 REFERENCE_SAMPLES = 10
 """The reference has so many times the samples that its combination has in all rounds together."""

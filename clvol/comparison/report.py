@@ -13,7 +13,7 @@ report.json holds, numbers as numbers and unknown ones as null:
   - slope: value, low, high; squared_bias, relative_squared_bias; worst_round_share
   - efficiency: by "seconds" and "lookups": value, ratio {value, low, high}, p, adjusted_p, significant
   - largest_error: x, y, channel, difference, deviation
-  - verdict: the fields of `clvol.agreement.Agreement`
+  - verdict: the fields of `clvol.measure.agreement.Agreement`
 """
 
 from __future__ import annotations

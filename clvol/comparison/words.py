@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from clvol.comparison.figures import COSTS, LEVEL, Comparison, Efficiency, Figures
-from clvol.efficiency import Interval
+from clvol.measure.efficiency import Interval
 
 _HEAVY = 0.5
 """A round with more of the squared error than this, and than four times its share, is not like the others."""

@@ -13,21 +13,21 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
-from clvol.candidates import Candidate, Relative, halve, precomputation, relative_efficiency
 from clvol.choices import Choices, majorant_needs, prepare_for, refuse_impossible, resolve
-from clvol.combinations import independent_seeds, unbiased
 from clvol.config import KernelConfig
 from clvol.device import Device
 from clvol.errors import OptionError
 from clvol.features import Features
+from clvol.measure.candidates import Candidate, Relative, halve, precomputation, relative_efficiency
+from clvol.measure.combinations import independent_seeds, unbiased
+from clvol.measure.quiet import quiet_renders
+from clvol.measure.reduced import reduced
+from clvol.measure.trials import Trial
 from clvol.prepare import MajorantNeeds, PreparedScene
 from clvol.programs import stage_source
-from clvol.quiet import quiet_renders
-from clvol.reduced import reduced
 from clvol.registry import FAMILIES
 from clvol.scene.records import Scene
 from clvol.session import MAX_SAMPLES, Session
-from clvol.trials import Trial
 
 log = logging.getLogger("clvol.pilot")
 CHOSEN = ("technique", "transmittance", "majorant")

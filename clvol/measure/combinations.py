@@ -16,9 +16,9 @@ from clvol.choices import Choices, refuse_impossible, resolve
 from clvol.config import KernelConfig
 from clvol.errors import OptionError
 from clvol.features import Features
+from clvol.measure.trials import Trial
 from clvol.registry import FAMILIES
 from clvol.session import Session
-from clvol.trials import Trial
 
 MOST_CONSIDERED = 4096
 """Of a larger product of choices so many combinations are drawn, always the same."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from clvol.trials import Trial
+from clvol.measure.trials import Trial
 
 
 @dataclass(eq=False)

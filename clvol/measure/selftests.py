@@ -2,7 +2,7 @@
 of choices against all the others, with a stated rate of false alarms and the smallest bias that would show.
 
 The film is small and every combination renders as many samples, in rounds by turns, each of its own seed.
-Combinations are the covering set of `clvol.combinations`, so that each choice is tested, not each product.
+Combinations are the covering set of `clvol.measure.combinations`: each choice is tested, not each product.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from clvol.choices import Choices
-from clvol.combinations import biased, covering, independent_seeds, names_in_force, options_of
 from clvol.device import Device, open_device
 from clvol.errors import OptionError
 from clvol.features import Features
-from clvol.judgement import Tested, common_choice, judge
-from clvol.quiet import quiet_renders
-from clvol.reduced import reduced
+from clvol.measure.combinations import biased, covering, independent_seeds, names_in_force, options_of
+from clvol.measure.judgement import Tested, common_choice, judge
+from clvol.measure.quiet import quiet_renders
+from clvol.measure.reduced import reduced
+from clvol.measure.trials import Trial, rounds
 from clvol.result import Result
 from clvol.scene.records import Scene
-from clvol.trials import Trial, rounds
 
 LEAST_ROUNDS, MOST_ROUNDS = 4, 32
 _TRIAL_SPP = 4

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from clvol.agreement import Agreement, agreement
-from clvol.combinations import Names
+from clvol.measure.agreement import Agreement, agreement
+from clvol.measure.combinations import Names
 from clvol.registry import FAMILIES
 from clvol.session import LARGE_WEIGHT
 
