@@ -27,6 +27,7 @@ class Choices:
         `clvol.registry`, or "auto".
     majorant_scale : multiplies every bound, for experiments.
     step : world length of a marching step; None takes the edge of a voxel.
+    target_error : mean relative standard error at which the render ends; samples go where the error is.
     aov : names of `registry.AOVS` to return as pictures; look-ups always are.
     """
 
@@ -40,6 +41,7 @@ class Choices:
     sampler: str = "auto"
     majorant_scale: float = 1.0
     step: float | None = None
+    target_error: float | None = None
     aov: tuple[str, ...] = field(default=())
 
     def __post_init__(self) -> None:
@@ -47,8 +49,9 @@ class Choices:
             registry.check_choice(family, getattr(self, family))
         object.__setattr__(self, "aov", _aovs(self.aov))
         _check_positive("majorant_scale", self.majorant_scale)
-        if self.step is not None:
-            _check_positive("step", self.step)
+        for name in ("step", "target_error"):
+            if getattr(self, name) is not None:
+                _check_positive(name, getattr(self, name))
 
     @property
     def names(self) -> dict[str, str]:

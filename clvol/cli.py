@@ -118,6 +118,14 @@ def main(ctx: click.Context) -> None:
     metavar="SECONDS",
     help="Render for so long instead.",
 )
+@click.option(
+    "--target-error",
+    type=click.FloatRange(min=0, min_open=True),
+    callback=finite,
+    metavar="NOISE",
+    help="Render until the mean relative standard error is below NOISE, as 0.01, with samples where "
+    "noise is; --spp or --time then say how long at most.",
+)
 @click.option("--seed", type=click.IntRange(min=0), help="Same seed, same bits; the scene's own by default.")
 @click.option("--device", metavar="PATTERN", help="Part of the device's name; see clvol devices.")
 @definitions_option

@@ -32,6 +32,7 @@ class KernelConfig:
     control: str = "mean"
     sampler: str = "independent"
     aov: tuple[str, ...] = ()
+    pixel_list: bool = False  # runs are over listed pixels, each at a sample of its own
     local_size: int = 1
     group_slots: int = 256
 
@@ -197,6 +198,7 @@ class KernelConfig:
             "CLVOL_HIDE_EMITTERS": int(f.hide_emitters),
             "CLVOL_FIRST_HIT": int(bool(self.first_hit)),
             "CLVOL_RANDOMIZATIONS": self.randomizations,
+            "CLVOL_PIXEL_LIST": int(self.pixel_list),
             "CLVOL_NEE": int(self.nee),
             "CLVOL_MIS": int(self.mis),
             "CLVOL_ABSORPTION": tuple(registry.ABSORPTIONS).index(self.absorption),

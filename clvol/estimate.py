@@ -9,8 +9,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NoReturn
 
 import numpy as np
+
+from clvol.errors import OptionError
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,19 +86,29 @@ class Replicates:
         return int((self.counts > 0).sum()) - 1
 
     def mean_and_variance(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mean, and its variance from the scatter of the randomisations' means; inf where there is only one.
-
-        Means of n samples count n times.  That is exact where all have the same number of samples, or where
-        the variance falls as 1/n.
-        """
+        """Mean, and its variance by the scatter of the randomisations' means; inf where there is only one."""
         mean = self.sum_ / self.count
         if self.dof < 1:
             return mean, np.full_like(mean, np.inf)
-        scatter = np.zeros_like(mean)
-        for total, count in zip(self.sums, self.counts, strict=True):
+        variance = np.zeros_like(mean)
+        for total, count, weight in zip(self.sums, self.counts, self._weights(), strict=True):
             if count:
-                scatter += count * (total / count - mean) ** 2
-        return mean, scatter / (self.dof * self.count)
+                variance += weight * (total / count - mean) ** 2
+        return mean, variance
+
+    def _weights(self) -> np.ndarray:
+        """What each randomisation's squared deviation counts for; float64 (randomisations,).
+
+        A mean m = Σ w m_r of independent means has E (m_r - m)² = (1 - 2 w_r) v_r + Σ w² v: the weights
+        w² / ((1 - 2 w) (1 + Σ w² / (1 - 2 w))) make Σ w² v of these whatever the v are, so that it does not
+        matter how much better 8 low-discrepancy samples are than 7.  That asks for w < 1/2; else the weights
+        are those that are right where v falls as 1 / samples.
+        """
+        shares = self.counts / self.count
+        if shares.max() < 0.5:
+            weights = shares**2 / (1 - 2 * shares)
+            return weights / (1 + weights.sum())
+        return shares / self.dof
 
     def plus(self, other: Replicates) -> Replicates:
         """Of further samples of the same randomisations."""
@@ -106,7 +119,41 @@ class Replicates:
         return Replicates(np.stack([_fit(total, shape) for total in self.sums]), self.counts)
 
 
-Estimate = Moments | Replicates
+@dataclass(frozen=True, eq=False)
+class Uneven:
+    """Means over samples of which each pixel has a number of its own.
+
+    Parameters
+    ----------
+    mean, variance : float64 (pixels, …)
+        The variance is the mean's; inf where it is unknown.
+    counts : int64 (pixels,)
+    dof : int
+        Least degrees of freedom of a pixel's variance.
+    """
+
+    mean: np.ndarray
+    variance: np.ndarray
+    counts: np.ndarray
+    dof: int
+
+    def mean_and_variance(self) -> tuple[np.ndarray, np.ndarray]:
+        """As they are."""
+        return self.mean, self.variance
+
+    def plus(self, other: Estimate) -> NoReturn:
+        """No: numbers of samples that were chosen for one picture do not add up."""
+        raise OptionError(
+            "results of a target_error do not merge",
+            hint="ask for a lower target_error, or render sample ranges without one",
+        )
+
+    def reshaped(self, *shape: int) -> Uneven:
+        """The same in another shape, broadcast to it."""
+        return Uneven(_fit(self.mean, shape), _fit(self.variance, shape), self.counts, self.dof)
+
+
+Estimate = Moments | Replicates | Uneven
 
 
 def _fit(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:

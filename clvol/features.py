@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from clvol.boundaries import Boundaries, camera_may_be_inside, find_boundaries, may_overlap
-from clvol.film import SIGNED
 from clvol.material_facts import (
     bsdf_kinds,
     bsdf_sides,
@@ -20,6 +19,7 @@ from clvol.material_facts import (
     reflects,
     samples_lights,
 )
+from clvol.pixel_filter import SIGNED
 from clvol.scene import records
 from clvol.scene.materials import Bsdf
 from clvol.scene.phase import phase_lobes

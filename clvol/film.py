@@ -1,58 +1,104 @@
-"""The pixel filter as a distribution of sample offsets: nothing is splatted.
+"""The film on the device: what finished samples add up to, pixel by pixel.
 
-Offsets are drawn in proportion to the filter's magnitude.  Samples drawn where it is negative count
-negatively, and all are scaled by what the magnitude integrates to, relative to the filter itself.
+A render has one; a pilot that decides how many samples each pixel gets has another, so that none of its
+samples is in the picture.
 """
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
+import pyopencl as cl
 
-from clvol.scene.records import ReconstructionFilter
+from clvol import layout
+from clvol.config import KernelConfig
+from clvol.device import Device
+from clvol.estimate import Estimate, Moments, Replicates, Uneven
+from clvol.sobol import samples_of_each
 
-FILTER_BINS = 1024
-SIGNED = ("mitchell", "lanczos")
-"""Filters that may be negative somewhere."""
 
+class Film:
+    """Sums over the samples of one seed.
 
-def filter_cdf(rfilter: ReconstructionFilter) -> np.ndarray:
-    """What offsets along one axis are drawn from, at FILTER_BINS + 1 even points of [-radius, radius].
-
-    float32 (FILTER_BINS + 1,): the integral of the filter's magnitude up to there, from 0 to 1.  For a filter
-    of `SIGNED` a second row follows with the integral of the filter itself, in the same units.  Within a bin
-    the filter counts as constant.  The box needs none.
+    Parameters
+    ----------
+    seed : low and high word of the seed of its samples.
+    pixels : of the picture.
     """
-    mass = np.diff(_integral(rfilter, np.linspace(-rfilter.radius, rfilter.radius, FILTER_BINS + 1)))
-    rows = np.stack([np.abs(mass), mass]) if rfilter.kind in SIGNED else mass[None]
-    sums = np.concatenate([np.zeros((len(rows), 1)), np.cumsum(rows, axis=1)], axis=1) / np.abs(mass).sum()
-    return sums.astype(np.float32).reshape(-1)
 
+    def __init__(self, device: Device, config: KernelConfig, pixels: int, seed: tuple[int, int]) -> None:
+        self.device, self.config, self.pixels, self.seed = device, config, pixels, seed
+        self.path_counts = layout.path_counts(config)
+        self.firsts = layout.first_hit_fields(config)
+        self.peaks = 1 + layout.shows_weight(config)
+        sizes = {
+            "film": 8 * (config.randomizations or 2) * config.channels * pixels,
+            "film_peaks": 4 * self.peaks * pixels,
+        }
+        if self.path_counts:
+            sizes["film_counts"] = 8 * len(self.path_counts) * pixels
+        if self.firsts:
+            sizes["film_firsts"] = 8 * len(self.firsts) * pixels
+        what, hint = f"a film of {pixels} pixels", "render fewer pixels"
+        self.buffers = {name: device.allocate(size, what, hint) for name, size in sizes.items()}
+        self.clear(seed)
 
-def _integral(rfilter: ReconstructionFilter, x: np.ndarray) -> np.ndarray:
-    """Integral of the filter up to each `x`, but for a constant and a factor; float64."""
-    r = rfilter.radius
-    if rfilter.kind == "tent":
-        return np.sign(x) * (np.abs(x) / r - 0.5 * (x / r) ** 2)
-    if rfilter.kind == "gaussian":  # cut at the radius and lowered to reach 0 there, as in Mitsuba
-        scale = rfilter.stddev * math.sqrt(2)
-        floor = math.exp(-((r / scale) ** 2))
-        erf = np.array([math.erf(position / scale) for position in x])
-        return 0.5 * scale * math.sqrt(math.pi) * erf - floor * x
-    if rfilter.kind == "mitchell":
-        return np.sign(x) * _mitchell_integral(np.abs(x), rfilter.b, rfilter.c)
-    if rfilter.kind == "lanczos":
-        nodes, weights = np.polynomial.legendre.leggauss(4)
-        middle, half = (x[1:] + x[:-1]) / 2, (x[1:] - x[:-1]) / 2
-        at = middle[:, None] + half[:, None] * nodes
-        return np.concatenate([[0.0], np.cumsum((np.sinc(at) * np.sinc(at / r)) @ weights * half)])
-    raise ValueError(f"no table for a {rfilter.kind} filter")
+    def clear(self, seed: tuple[int, int]) -> None:
+        """Forget every sample; the next ones are another seed's."""
+        self.seed = seed
+        for buffer in self.buffers.values():
+            cl.enqueue_fill_buffer(self.device.queue, buffer, np.uint32(0), 0, buffer.size)
+        self.samples = np.zeros(self.pixels, np.int64)  # of each pixel, where they are not the same of all
+        self.slot_totals = dict.fromkeys(layout.slot_fields(self.config), 0.0)
 
+    def _read(self, name: str, shape: tuple[int, ...], dtype: type) -> np.ndarray:
+        array = np.empty(shape, dtype)
+        cl.enqueue_copy(self.device.queue, array, self.buffers[name], is_blocking=True)
+        return array
 
-def _mitchell_integral(x: np.ndarray, b: float, c: float) -> np.ndarray:
-    """Integral from 0 to x >= 0 of the piecewise cubic of Mitchell and Netravali (1988, eq. 8), times 6."""
-    inner = np.polyint([12 - 9 * b - 6 * c, -18 + 12 * b + 6 * c, 0, 6 - 2 * b])
-    outer = np.polyint([-b - 6 * c, 6 * b + 30 * c, -12 * b - 48 * c, 8 * b + 24 * c])
-    beyond = np.polyval(outer, np.clip(x, 1, 2)) - np.polyval(outer, 1)
-    return np.polyval(inner, np.minimum(x, 1)) + beyond
+    def _sums(self) -> np.ndarray:
+        """Of each randomisation, or of samples and squares; float64 (parts, pixels, channels)."""
+        parts = self.config.randomizations or 2
+        film = self._read("film", (self.pixels, parts, self.config.channels, 2), np.float32)
+        return np.moveaxis(film[..., 0].astype(np.float64) + film[..., 1], 1, 0)
+
+    def estimate(self, first: int, count: int) -> Estimate:
+        """What the samples `first` to `first + count`, all rendered, add up to; (pixels, channels)."""
+        return self._estimate(self._sums(), first, count)
+
+    def _estimate(self, sums: np.ndarray, first: int, count: int) -> Moments | Replicates:
+        if self.config.randomizations:
+            return Replicates(sums, samples_of_each(first, count))
+        return Moments(sums[0], sums[1], count)
+
+    def uneven_estimate(self) -> Uneven:
+        """What the samples, from 0 on as many as each pixel has, add up to; (pixels, channels)."""
+        sums = self._sums()
+        mean, variance = np.zeros(sums.shape[1:]), np.full(sums.shape[1:], np.inf)
+        least = []
+        for count in np.unique(self.samples[self.samples > 0]):
+            at = self.samples == count
+            estimate = self._estimate(sums[:, at], 0, int(count))
+            mean[at], variance[at] = estimate.mean_and_variance()
+            least.append(estimate.dof)
+        return Uneven(mean, variance, self.samples.copy(), min(least, default=0))
+
+    def counts(self) -> dict[str, np.ndarray]:
+        """What walks counted so far, by name, uint64 (pixels,)."""
+        if not self.path_counts:
+            return {}
+        counts = self._read("film_counts", (self.pixels, len(self.path_counts)), np.uint64)
+        return {name: counts[:, n] for n, name in enumerate(self.path_counts)}
+
+    def first_hits(self) -> dict[str, np.ndarray]:
+        """Sums over the paths of what they first met, by field, float64 (pixels,)."""
+        if not self.firsts:
+            return {}
+        film = self._read("film_firsts", (self.pixels, len(self.firsts), 2), np.float32).astype(np.float64)
+        return {name: film[:, n, 0] + film[:, n, 1] for n, name in enumerate(self.firsts)}
+
+    def peaks_by_pixel(self) -> dict[str, np.ndarray]:
+        """Largest absolute sample of each pixel, and weight where a picture shows it; float32 (pixels,)."""
+        peaks = self._read("film_peaks", (self.pixels, self.peaks), np.float32)
+        return {
+            name: peaks[:, n] for n, name in enumerate(("largest_sample", "largest_weight")[: self.peaks])
+        }

@@ -326,6 +326,7 @@ SLOT_STATISTICS = {
 def path_counts(config: KernelConfig) -> tuple[str, ...]:
     """Counts that are kept per path and summed per pixel: look-ups, and what `config.aov` shows."""
     shown = {"lookups", *config.aov} | ({"tentative", "real"} if "null" in config.aov else set())
+    shown |= {"cells"} if "efficiency" in config.aov else set()
     kept = {field.name for field in path_fields(config)}
     return tuple(name for name in registry.COUNTS if name in shown and name in kept)
 
@@ -381,6 +382,7 @@ def arguments(config: KernelConfig) -> list[Argument]:
         Argument("results", "__global float *"),
         Argument("result_counts", "__global uint *", counts_per_path(config) > 0),
         Argument("result_firsts", "__global float *", bool(config.first_hit)),
+        Argument("pixel_list", "__global const uint *", config.pixel_list),  # pixel, its samples so far
         Argument("sobol", "__global const uint *", config.sampler == "sobol"),
         Argument("media", "__global const Medium *", features.media > 0),
         Argument("boundary_masks", "__global const uint *", features.boundaries > 0),

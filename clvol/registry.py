@@ -180,7 +180,12 @@ FIRST_HIT = {
 """What camera paths first meet, and its channels; 0 for a path that meets nothing."""
 AOVS = (
     COUNTS
-    | {"null": "null collisions", "largest_weight": "largest absolute path weight"}
+    | {
+        "null": "null collisions",
+        "largest_weight": "largest absolute path weight",
+        "variance": "variance of a sample, mean over the channels",
+        "efficiency": "1 / (variance · seconds), seconds dealt out by look-ups and cells",
+    }
     | {name: summary for name, (summary, _) in FIRST_HIT.items()}
 )
 

@@ -12,6 +12,7 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 
 from clvol import registry
+from clvol.adaptive import TargetRender
 from clvol.choices import Choices
 from clvol.device import Device, open_device
 from clvol.errors import OptionError
@@ -40,6 +41,7 @@ def render(
     step: float | None = None,
     aov: Sequence[str] = (),
     time_limit: float | None = None,
+    target_error: float | None = None,
     device: str | None = None,
     progress: bool | ProgressCallback = False,
     samples: tuple[int, int] | None = None,
@@ -60,6 +62,8 @@ def render(
     step : world length of a step of ray marching; the edge of a voxel by default.
     aov : names from `registry.AOVS` to add to `result.aovs`: means per sample ("largest_weight": maxima).
     time_limit : seconds after which no new pass of samples is begun; alone it replaces `spp`.
+    target_error : mean relative standard error (`Result.noise`) at which the render ends, judged by a pilot
+        that is not in the picture; pixels get samples by their noise.  `spp` then is the most on the mean.
     device : index or part of the name of an OpenCL device (see `clvol devices`).
     progress : True for a progress bar, or a callable that receives `clvol.progress.Progress` records.
     samples : (first, count): render only these of the samples; results of disjoint ranges `merge`.
@@ -94,7 +98,9 @@ def render(
     names = {family: _choice(scene, family, value) for family, value in asked.items()}
     if piloted:
         names["technique"] = "auto"  # the scene's own technique too is put to the test
-    choices = Choices(**names, majorant_scale=majorant_scale, step=step, aov=aov)
+    choices = Choices(**names, majorant_scale=majorant_scale, step=step, target_error=target_error, aov=aov)
+    if target_error is not None and samples is not None:
+        raise OptionError("target_error and samples exclude each other", hint="spp says how many at most")
     first, count = _sample_range(scene, spp, time_limit, samples)
     seed = scene.seed if seed is None else seed
     bar = RichProgress() if progress is True else nullcontext(progress or None)
@@ -106,10 +112,13 @@ def render(
     session.describe()
     session.warn_of_unused(asked)
     with bar as callback, _interrupt_flag() as interrupted:
-        done = session.run(first, count, time_limit, callback, interrupted)
+        if target_error is None:
+            done = session.run(first, count, time_limit, callback, interrupted)
+        else:
+            done = TargetRender(session, target_error, spp).run(time_limit, callback, interrupted)
     result = session.result(first, done)
     result.stats["interrupted"] = bool(interrupted())
-    result.metadata |= about
+    result.metadata |= about | ({"target_error": target_error} if target_error is not None else {})
     return result
 
 

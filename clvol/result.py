@@ -179,10 +179,11 @@ def merge(results: Iterable[Result]) -> Result:
         raise OptionError("nothing to merge", hint="give at least one result")
     for other in results[1:]:
         _check_same_render(results[0], other)
+    estimate = reduce(lambda one, other: one.plus(other), [result.estimate for result in results])
     ranges = _joined([span for result in results for span in result.ranges])
     counts = [result.samples[1] for result in results]
     merged = Result.from_estimate(
-        reduce(lambda one, other: one.plus(other), [result.estimate for result in results]),
+        estimate,
         samples=(ranges[0][0], sum(counts)),
         aovs={name: _merged_aov(name, results, counts) for name in results[0].aovs},
         stats=_merged_stats([result.stats for result in results]),

@@ -15,22 +15,19 @@ from clvol.choices import Choices, prepare_for, resolve
 from clvol.config import KernelConfig
 from clvol.device import Device
 from clvol.errors import OptionError
-from clvol.film import FILTER_BINS
+from clvol.outcome import make_result
+from clvol.pixel_filter import FILTER_BINS
 from clvol.prepare import PreparedScene
 from clvol.programs import build_stages
 from clvol.progress import Progress, ProgressCallback
 from clvol.result import Result, relative_noise
-from clvol.scene.digest import scene_digest
 from clvol.scene.records import Scene
 from clvol.upload import upload_scene
-from clvol.version import __version__
 from clvol.wavefront import Pool, Progressed, Wavefront
 
 log = logging.getLogger("clvol")
 MAX_SAMPLES = 2**32 - 1
 """Samples of a pixel are numbered in 32 bits; a render without an end asks for all of them."""
-LARGE_WEIGHT = 100.0
-"""Paths that weigh so much more than others are rare: few samples do not show them."""
 _NOISE_SECONDS = 0.5
 """The noise shown by the progress bar is read from the film at most this often."""
 
@@ -182,123 +179,12 @@ class Session:
         return done
 
     def _noise(self, first: int, count: int) -> float:
-        estimate = self.wavefront.estimate(first, count)
+        estimate = self.wavefront.film.estimate(first, count)
         return relative_noise(*estimate.mean_and_variance(), estimate.dof)
 
     def result(self, first: int, count: int) -> Result:
         """The film as a Result, with what it cost."""
-        film = self.prepared.scene.film
-        shape = film.window[3], film.window[2]
-        stats = self._statistics(count)
-        metadata = {
-            "scene": self.prepared.scene.source,
-            "digest": scene_digest(self.prepared.scene),
-            **self.choices(),
-            **({"majorant_scale": self.prepared.needs.scale} if self.prepared.needs.scale != 1 else {}),
-            **({"biased": ", ".join(self.biased()), "step": self.step or "voxel"} if self.biased() else {}),
-            "spp": count,
-            "seed": self.seed,
-            "device": self.device.description,
-            "version": __version__,
-            "seconds": round(self.seconds, 4),
-        }
-        aovs = {
-            name: values.reshape(*shape, *values.shape[1:]) for name, values in self._pictures(count).items()
-        }
-        estimate = self.wavefront.estimate(first, count).reshaped(*shape, 3)
-        return Result.from_estimate(estimate, (first, count), aovs, stats, metadata)
-
-    def _pictures(self, count: int) -> dict[str, np.ndarray]:
-        """Look-ups and what `aov` asks for: means per sample, and the largest weight; float32 (pixels,)."""
-        pixels = self.wavefront.pixels
-        counts = {n: c.astype(np.float64) / count for n, c in self.wavefront.counts().items()}
-        peaks = self.wavefront.peaks_by_pixel()
-        found = {}
-        for name in dict.fromkeys(("lookups", *self.config.aov)):
-            if name in registry.FIRST_HIT:
-                values = self._first_hit(name, count * self.config.jobs_per_sample)
-            elif name == "largest_weight":
-                values = peaks.get(name, np.ones(pixels))
-            elif name == "null":
-                values = counts["tentative"] - counts["real"] if "tentative" in counts else np.zeros(pixels)
-            else:
-                values = counts.get(name, np.zeros(pixels))
-            found[name] = values.astype(np.float32)
-        return found
-
-    def _first_hit(self, name: str, paths: int) -> np.ndarray:
-        """A picture of what camera paths first met: means over `paths` paths, float64 (pixels[, 3])."""
-        sums = self.wavefront.first_hits()
-        channels = registry.FIRST_HIT[name][1]
-        means = np.stack([sums[f"{name}_{c}"] / paths for c in range(channels)], axis=1)
-        if name == "position":  # the device's are relative to the centre
-            means += sums["met"][:, None] / paths * self.prepared.centre
-        return means if channels > 1 else means[:, 0]
-
-    def _statistics(self, count: int) -> dict:
-        wavefront = self.wavefront
-        slots = wavefront.slot_statistics()
-        peaks = {n: float(p.max(initial=0.0)) for n, p in wavefront.peaks_by_pixel().items()}
-        counts = {n: int(slots.get(n, 0)) for n in registry.COUNTS}
-        counts |= {n: int(c.sum()) for n, c in wavefront.counts().items()}
-        paths = count * wavefront.pixels * self.config.jobs_per_sample
-        stats = {
-            "paths": paths,
-            "lookups": counts["lookups"],
-            "tentative_collisions": counts["tentative"],
-            "null_collisions": counts["tentative"] - counts["real"],
-            "real_collisions": counts["real"],
-            "cells_crossed": counts["cells"],
-            "seconds": {
-                "setup": self.setup_seconds,
-                "kernels": self.kernel_seconds,
-                "render": self.seconds,
-                **wavefront.seconds,
-            },
-            "launches": wavefront.launches,
-            "waves": wavefront.waves,
-            "slots": wavefront.pool.slots,
-            "bytes_per_slot": 4 * len(wavefront.fields),
-            "non_finite": wavefront.non_finite(),
-            "majorant_violations": counts["violations"],
-            "walks_exhausted": int(slots.get("exhausted", 0)),
-            "largest_weight": max(1.0, slots.get("largest_weight", 0.0), peaks.get("largest_weight", 0.0)),
-            "largest_sample": peaks["largest_sample"],
-            "paths_cut_by_max_depth": int(slots.get("cut", 0)),
-            "energy_lost_to_caps": slots.get("cut_energy", 0.0) / paths,
-        }
-        if (
-            self.config.features.heterogeneous
-            and not stats["lookups"]
-            and not self.config.features.homogeneous
-        ):
-            log.warning("no path met any density: are the transforms right?")
-        for name in ("non_finite", "walks_exhausted"):
-            if stats[name]:
-                log.warning("%s: %d", name.replace("_", " "), stats[name])
-        if stats["majorant_violations"]:
-            log.warning(
-                "%d of %d look-ups were above their majorant: %s",
-                stats["majorant_violations"],
-                stats["lookups"],
-                "the picture is biased"
-                if self.needs_bound()
-                else "these techniques stay unbiased, at more noise",
-            )
-        if stats["largest_weight"] > LARGE_WEIGHT:
-            log.warning(
-                "weights grew to %.2g: the picture is noisier than its variance says; raise majorant_scale, "
-                "use probability history, or a technique without weights",
-                stats["largest_weight"],
-            )
-        log.info(
-            "set-up (volumes, majorants, kernels)  %8.3f seconds, %.3f of them for kernels",
-            self.setup_seconds,
-            self.kernel_seconds,
-        )
-        for stage, seconds in wavefront.seconds.items():
-            log.info("stage %-20s %8.3f seconds", stage, seconds)
-        return stats
+        return make_result(self, first, count)
 
 
 def kernel_config(prepared: PreparedScene, choices: Choices, device: Device) -> KernelConfig:
@@ -307,7 +193,14 @@ def kernel_config(prepared: PreparedScene, choices: Choices, device: Device) -> 
     tuning = (
         {"local_size": 1, "group_slots": 256} if device.is_cpu else {"local_size": 128, "group_slots": 1024}
     )
-    return KernelConfig(prepared.features, majorant=prepared.majorant, aov=choices.aov, **resolved, **tuning)
+    return KernelConfig(
+        prepared.features,
+        majorant=prepared.majorant,
+        aov=choices.aov,
+        pixel_list=choices.target_error is not None,
+        **resolved,
+        **tuning,
+    )
 
 
 def seed_words(seed: int) -> tuple[int, int]:

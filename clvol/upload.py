@@ -13,10 +13,10 @@ from clvol import layout
 from clvol.blackbody import blackbody_table
 from clvol.config import KernelConfig
 from clvol.device import Device
-from clvol.film import filter_cdf
 from clvol.lights import LightTable, emitter_order, envmap_arrays, light_table
 from clvol.material_table import material_table
 from clvol.medium_table import medium_table, phase_table, rows_3x4
+from clvol.pixel_filter import filter_cdf
 from clvol.prepare import PreparedScene
 from clvol.sobol import block_table
 from clvol.volumes.bricks import BRICK_SAMPLES

@@ -19,8 +19,7 @@ from clvol import layout
 from clvol.config import KernelConfig
 from clvol.device import Device
 from clvol.errors import OptionError
-from clvol.estimate import Estimate, Moments, Replicates
-from clvol.sobol import samples_of_each
+from clvol.film import Film
 
 NO_JOB = 0xFFFFFFFF
 _NEXT_JOB, _JOB_LIMIT, _NON_FINITE, _DONE = (layout.enum("CONTROL", n) for n in layout.ENUMS["CONTROL"])
@@ -81,14 +80,11 @@ class Wavefront:
         self.device, self.config, self.kernels, self.pool = device, config, kernels, pool
         self.render = render
         self.pixels = int(render["film_size"][0, 0]) * int(render["film_size"][0, 1])
-        self.sample_jobs = self.pixels * config.jobs_per_sample  # of one sample of every pixel
-        self.pass_samples = max(1, pool.pass_jobs // self.sample_jobs)
+        self.buffers: dict[str, cl.Buffer] = {}
+        self.list_pixels(None)
         self.groups = pool.slots // config.group_slots
         self.fields = layout.path_fields(config)
-        self.path_counts = layout.path_counts(config)
-        self.firsts = layout.first_hit_fields(config)
-        self.peaks = 1 + layout.shows_weight(config)
-        self.slot_totals = dict.fromkeys(layout.slot_fields(config), 0.0)
+        self.film = self.new_film(tuple(int(word) for word in render["seed"][0]))
         self._harvested = time.perf_counter()
         self.stride = pool.slots + 16  # off the power of two, or all fields of a slot share a cache set
         self.seconds = dict.fromkeys((*config.stages, "accumulate"), 0.0)
@@ -104,22 +100,15 @@ class Wavefront:
             "counts": 4 * layout.COUNTER_STRIDE * self.groups,
             "control": 4 * (_DONE + self.pool.ring_passes),
             "results": 4 * self.config.channels * ring_jobs // self.config.jobs_per_sample,
-            **({"result_firsts": 4 * len(self.firsts) * ring_jobs} if self.firsts else {}),
         }
+        if self.film.firsts:
+            sizes["result_firsts"] = 4 * len(self.film.firsts) * ring_jobs
+        if self.config.pixel_list:
+            sizes["pixel_list"] = 8 * self.pixels
         if stride := layout.counts_per_path(self.config):
             sizes["result_counts"] = 4 * stride * ring_jobs
         self.buffers = {name: self._buffer(size) for name, size in sizes.items()} | scene_buffers
         self.bytes = sum(sizes.values()) + sum(b.size for b in scene_buffers.values())
-        film_sizes = {
-            "film": 8 * (self.config.randomizations or 2) * self.config.channels * self.pixels,
-            "film_peaks": 4 * self.peaks * self.pixels,
-        }
-        if self.path_counts:
-            film_sizes["film_counts"] = 8 * len(self.path_counts) * self.pixels
-        if self.firsts:
-            film_sizes["film_firsts"] = 8 * len(self.firsts) * self.pixels
-        self.film = {name: self._buffer(size) for name, size in film_sizes.items()}
-        self._clear_film()
         state = np.zeros((len(self.fields), self.stride), np.uint32)
         state[[f.name for f in self.fields].index("job")] = NO_JOB
         self._write("state", state)
@@ -130,19 +119,23 @@ class Wavefront:
         ]
         for stage in self.config.stages:
             self.kernels[stage].set_args(*values)
-
-    def _clear_film(self) -> None:
-        for buffer in self.film.values():
-            cl.enqueue_fill_buffer(self.device.queue, buffer, np.uint32(0), 0, buffer.size)
+        self.list_pixels(None)
 
     def restart(self, seed: tuple[int, int]) -> None:
         """Forget every sample and what was counted; the next run draws the random numbers of another seed."""
         self._harvest()
-        self._clear_film()
+        self.film.clear(seed)
         self._write("control", np.zeros(_DONE + self.pool.ring_passes, np.uint32))
-        self.render["seed"] = seed
-        self.slot_totals = dict.fromkeys(self.slot_totals, 0.0)
         self._reset_clocks()
+
+    def new_film(self, seed: tuple[int, int]) -> Film:
+        """An empty film for samples of another seed."""
+        return Film(self.device, self.config, self.pixels, seed)
+
+    def use_film(self, film: Film) -> None:
+        """Go on with another film, which the next run adds to."""
+        self._harvest()
+        self.film = film
 
     def _reset_clocks(self) -> None:
         self.seconds = dict.fromkeys(self.seconds, 0.0)
@@ -154,6 +147,19 @@ class Wavefront:
     def _write(self, name: str, array: np.ndarray, offset: int = 0) -> None:
         cl.enqueue_copy(self.device.queue, self.buffers[name], array, dst_offset=offset, is_blocking=True)
 
+    def list_pixels(self, pixels: np.ndarray | None) -> None:
+        """What the next run renders: these pixels, each from the first sample on that its film lacks.
+
+        int (n,), or None for all; a list needs kernels with `config.pixel_list`.
+        """
+        chosen = np.arange(self.pixels) if pixels is None else pixels
+        self.listed = len(chosen)
+        self.sample_jobs = self.listed * self.config.jobs_per_sample  # of one sample of each
+        self.pass_samples = max(1, self.pool.pass_jobs // self.sample_jobs)
+        if self.config.pixel_list and self.buffers:
+            entries = np.stack([chosen, self.film.samples[chosen]], axis=1).astype(np.uint32)
+            self._write("pixel_list", entries)
+
     def run(
         self,
         first: int,
@@ -161,7 +167,7 @@ class Wavefront:
         should_stop: Callable[[], bool],
         report: Callable[[Progressed], None],
     ) -> int:
-        """Render samples `first` .. `first + count` of every pixel; return how many were done.
+        """Render samples `first` .. `first + count` of every pixel listed; return how many were done.
 
         `should_stop` is asked between batches; once it says yes no new pass is begun, and the passes in
         flight are finished, never dropped (dropping would favour short paths).
@@ -225,6 +231,7 @@ class Wavefront:
         self._reset_clocks()
 
     def _start_round(self, first: int, pass_jobs: int, last_pass: int, last_samples: int) -> None:
+        self.render["seed"] = self.film.seed
         self.render["first_sample"], self.render["pass_samples"] = first, self.pass_samples
         self.render["pass_jobs"], self.render["ring_passes"] = pass_jobs, self.pool.ring_passes
         self.render["last_pass"], self.render["last_samples"] = last_pass, last_samples
@@ -262,80 +269,47 @@ class Wavefront:
 
     def _accumulate(self, ring_pass: int, samples: int, first: int) -> None:
         """Add one finished pass, from sample `first` on, to the film and free its place in the ring."""
-        local = 64
+        local, film = 64, self.film.buffers
         event = self.kernels["accumulate"](
             self.device.queue,
-            (-(-self.pixels // local) * local,),
+            (-(-self.listed // local) * local,),
             (local,),
             self.buffers["results"],
-            *(self.film[name] for name in ("film", "film_peaks")),
+            *(film[name] for name in ("film", "film_peaks")),
             *((self.buffers["result_counts"],) if "result_counts" in self.buffers else ()),
-            *((self.film["film_counts"],) if self.path_counts else ()),
-            *((self.buffers["result_firsts"], self.film["film_firsts"]) if self.firsts else ()),
+            *((film["film_counts"],) if "film_counts" in film else ()),
+            *((self.buffers["result_firsts"], film["film_firsts"]) if "film_firsts" in film else ()),
+            *((self.buffers["pixel_list"],) if self.config.pixel_list else ()),
             self.buffers["control"],
             np.uint32(ring_pass),
             np.uint32(self.pass_samples * self.sample_jobs),
             np.uint32(samples),
             np.uint32(first),
-            np.uint32(self.pixels),
+            np.uint32(self.listed),
         )
         event.wait()
         self.launches += 1
         self.seconds["accumulate"] += 1e-9 * (event.profile.end - event.profile.start)
         self._write("control", np.zeros(1, np.uint32), 4 * (_DONE + ring_pass))
 
-    def _film(self, name: str, shape: tuple[int, ...], dtype: type) -> np.ndarray:
-        array = np.empty(shape, dtype)
-        cl.enqueue_copy(self.device.queue, array, self.film[name], is_blocking=True)
-        return array
-
-    def estimate(self, first: int, count: int) -> Estimate:
-        """What the samples `first` to `first + count`, all rendered, add up to; (pixels, channels)."""
-        parts = self.config.randomizations or 2  # else the sum and that of squares
-        film = self._film("film", (self.pixels, parts, self.config.channels, 2), np.float32)
-        sums = np.moveaxis(film[..., 0].astype(np.float64) + film[..., 1], 1, 0)
-        if self.config.randomizations:
-            return Replicates(sums, samples_of_each(first, count))
-        return Moments(sums[0], sums[1], count)
-
-    def counts(self) -> dict[str, np.ndarray]:
-        """What walks counted so far, by name, uint64 (pixels,)."""
-        if not self.path_counts:
-            return {}
-        counts = self._film("film_counts", (self.pixels, len(self.path_counts)), np.uint64)
-        return {name: counts[:, n] for n, name in enumerate(self.path_counts)}
-
-    def first_hits(self) -> dict[str, np.ndarray]:
-        """Sums over the paths of what they first met, by field, float64 (pixels,)."""
-        if not self.firsts:
-            return {}
-        film = self._film("film_firsts", (self.pixels, len(self.firsts), 2), np.float32).astype(np.float64)
-        return {name: film[:, n, 0] + film[:, n, 1] for n, name in enumerate(self.firsts)}
-
-    def peaks_by_pixel(self) -> dict[str, np.ndarray]:
-        """Largest absolute sample of each pixel, and weight where a picture shows it; float32 (pixels,)."""
-        peaks = self._film("film_peaks", (self.pixels, self.peaks), np.float32)
-        return {
-            name: peaks[:, n] for n, name in enumerate(("largest_sample", "largest_weight")[: self.peaks])
-        }
-
     def slot_statistics(self) -> dict[str, float]:
         """Statistics that slots keep for themselves, combined over the slots."""
         self._harvest()
-        return dict(self.slot_totals)
+        return dict(self.film.slot_totals)
 
     def _harvest(self) -> None:
         """Collect what the slots have counted since the last time, and let them begin anew."""
         rows = {f.name: n for n, f in enumerate(self.fields)}
         zeros = np.zeros(self.stride, np.uint32)
-        for name in self.slot_totals:
+        totals = self.film.slot_totals
+        for name in totals:
             field, row = self.fields[rows[name]], np.empty(self.stride, np.uint32)
             at = 4 * self.stride * rows[name]
             cl.enqueue_copy(self.device.queue, row, self.buffers["state"], src_offset=at, is_blocking=True)
             self._write("state", zeros, at)
             found = (row.view(np.float32) if field.kind == "f" else row)[: self.pool.slots].astype(np.float64)
             combine = layout.SLOT_STATISTICS[name]
-            self.slot_totals[name] = combine([self.slot_totals[name], combine(found)]).item()
+            totals[name] = combine([totals[name], combine(found)]).item()
         self._harvested = time.perf_counter()
 
     def non_finite(self) -> int:

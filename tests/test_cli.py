@@ -251,6 +251,7 @@ def test_options_reach_render_unchanged(scene: str, tmp_path: Path, monkeypatch:
     assert seen == {
         "spp": None,
         "time_limit": 2.0,
+        "target_error": None,
         "seed": 7,
         "device": "pocl",
         "technique": "delta",

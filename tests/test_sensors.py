@@ -16,7 +16,7 @@ from stat_tests import FALSE_ALARM, largest_z
 import clvol
 from clvol.camera import camera_rays
 from clvol.describe import describe_scene
-from clvol.film import FILTER_BINS, filter_cdf
+from clvol.pixel_filter import FILTER_BINS, filter_cdf
 from clvol.scene.records import Film, Perspective, ReconstructionFilter
 
 VIEW = clvol.look_at((1, 2, 3), (0, 0.5, -1), (0, 1, 0))

@@ -54,14 +54,22 @@ __kernel void accumulate_kernel(__global const float *results, __global float *f
 #if CLVOL_FIRST_HIT
                                 __global const float *result_firsts, __global float *film_firsts,
 #endif
+#if CLVOL_PIXEL_LIST
+                                __global const uint *pixel_list,
+#endif
                                 __global uint *control, uint ring_pass, uint pass_jobs, uint samples,
                                 uint first_sample, uint pixels)
 {
-    const uint pixel = get_global_id(0);
+    uint pixel = get_global_id(0);
     if (pixel >= pixels)
         return;
     const uint jobs = samples * CLVOL_JOBS_PER_SAMPLE; /* of the pixel */
     const size_t first_job = (size_t)ring_pass * pass_jobs + (size_t)pixel * jobs;
+#if CLVOL_PIXEL_LIST
+    const uint2 entry = vload2(pixel, pixel_list); /* a pixel, and how many samples it has */
+    pixel = entry.x;
+    first_sample += entry.y;
+#endif
     const size_t first = first_job / CLVOL_JOBS_PER_SAMPLE;
 #if CLVOL_PATH_COUNTS
     for (uint n = 0; n < CLVOL_PATH_COUNTS; ++n) {

@@ -88,14 +88,18 @@ INLINE void start_job(const Scene *scene, uint slot, uint job)
     const uint pass = job / render->pass_jobs;
     const uint in_pass = job % render->pass_jobs / CLVOL_JOBS_PER_SAMPLE; /* its sample within the pass */
     const uint samples = pass == render->last_pass ? render->last_samples : render->pass_samples;
-    const uint pixel = in_pass / samples;
     SampleKey key;
-    key.pixel = pixel;
+    key.pixel = in_pass / samples;
     key.sample = render->first_sample + pass * render->pass_samples + in_pass % samples;
+#if CLVOL_PIXEL_LIST
+    const uint2 entry = vload2(key.pixel, scene->pixel_list); /* a pixel, and how many samples it has */
+    key.pixel = entry.x;
+    key.sample += entry.y;
+#endif
     key.bounce = 0;
     const uint4 k = decision_block(scene, key, BLOCK_CAMERA, 0);
     const int width = render->film_size[0];
-    const int px = (int)(pixel % (uint)width), py = (int)(pixel / (uint)width);
+    const int px = (int)(key.pixel % (uint)width), py = (int)(key.pixel / (uint)width);
     float weight = 1.0f;
     const float x = (float)px + filter_offset(scene, k.x, px, width, &weight);
     const float y = (float)py + filter_offset(scene, k.y, py, render->film_size[1], &weight);
