@@ -1,20 +1,12 @@
-/* Sampler "sobol": what a pixel's samples decide by is a Sobol' sequence, Owen-scrambled anew for each pixel and
-   randomisation, so that samples cover each decision evenly, and those of a path's beginning together.
+/* Sampler "sobol": each block of decisions takes its numbers from a Sobol' sequence in four dimensions, with a
+   pixel's samples in an order of its own and Owen-scrambled anew (clvol/sobol.py), so that samples cover each
+   decision evenly.
 
    Every number alone is exactly uniform and independent of the others of its path: no mean changes.
    Samples of one randomisation depend on each other; randomisations do not (clvol/estimate.py). */
 #ifndef CLVOL_CORE_SOBOL_H
 #define CLVOL_CORE_SOBOL_H
 
-/* Groups of dimensions in clvol/sobol.py. */
-#define SOBOL_CAMERA 0u
-#define SOBOL_WALK 1u
-#define SOBOL_LIGHT 2u
-#define SOBOL_SHADOW 3u
-#define SOBOL_DIRECTION 4u
-#define SOBOL_PER_BOUNCE 4u
-#define SOBOL_OTHER 9u
-#define SOBOL_BOUNCES 2u
 #define SOBOL_SHUFFLED 0x3FFu /* samples are put in another order within runs of so many and one */
 
 INLINE uint reverse_bits(uint x)
@@ -47,27 +39,12 @@ INLINE uint mixed_bits(uint x)
     return x ^ (x >> 16);
 }
 
-/* The dimensions that a block takes. */
-INLINE uint sobol_group(SampleKey key, uint block, uint interval)
+/* Number `index` of the sequence, bits reversed. */
+INLINE uint4 sobol_point(const Scene *scene, uint index)
 {
-    if (block == BLOCK_CAMERA)
-        return SOBOL_CAMERA;
-    const bool after = block == BLOCK_LIGHT || block == BLOCK_SHADOW || block == BLOCK_DIRECTION; /* the scattering */
-    const uint bounce = after ? key.bounce - 1u : key.bounce;
-    if (interval > 0 || bounce >= SOBOL_BOUNCES)
-        return SOBOL_OTHER;
-    const uint first = block == BLOCK_WALK     ? SOBOL_WALK
-                       : block == BLOCK_LIGHT  ? SOBOL_LIGHT
-                       : block == BLOCK_SHADOW ? SOBOL_SHADOW
-                                               : SOBOL_DIRECTION;
-    return first + SOBOL_PER_BOUNCE * bounce;
-}
-
-/* Number `index` of the sequence in a group's four dimensions, bits reversed. */
-INLINE uint4 sobol_point(const Scene *scene, uint group, uint index)
-{
-    __global const uint *digits = scene->sobol + group * (8u * 16u * 4u);
+    __global const uint *digits = scene->sobol;
     uint4 point = (uint4)(0u);
+#pragma unroll 1 /* few turns; unrolled it would take a third of all build time */
     for (; index > 0; index >>= 4, digits += 16 * 4)
         point ^= vload4(index & 15u, digits);
     return point;
@@ -77,15 +54,13 @@ INLINE uint4 sobol_point(const Scene *scene, uint group, uint index)
 INLINE uint4 decision_block(const Scene *scene, SampleKey key, uint block, uint interval)
 {
     const uint2 seed = (uint2)(scene->render->seed[0], scene->render->seed[1]);
-    const uint randomization = key.sample % CLVOL_RANDOMIZATIONS;
-    const uint number = block_number(key, block), group = sobol_group(key, block, interval);
-    uint index = key.sample / CLVOL_RANDOMIZATIONS;
-    if (group == SOBOL_OTHER) {
-        const uint place = mixed_bits(number ^ (interval << 16) ^ mixed_bits(seed.x ^ mixed_bits(seed.y ^ randomization)));
-        const uint order = reverse_bits(owen_scramble(reverse_bits(index), mixed_bits(key.pixel ^ place)));
-        index = (order & SOBOL_SHUFFLED) | (index & ~SOBOL_SHUFFLED);
-    }
-    const uint4 point = sobol_point(scene, group, index);
+    const uint randomization = key.sample % CLVOL_RANDOMIZATIONS, index = key.sample / CLVOL_RANDOMIZATIONS;
+    const uint number = block_number(key, block);
+    const uint place = mixed_bits(number ^ (interval << 16) ^ mixed_bits(seed.x ^ mixed_bits(seed.y ^ randomization)));
+    const uint order = reverse_bits(owen_scramble(reverse_bits(index), mixed_bits(key.pixel ^ place)));
+    uint4 point = sobol_point(scene, (order & SOBOL_SHUFFLED) | (index & ~SOBOL_SHUFFLED));
+    if (block == BLOCK_LIGHT || block == BLOCK_SURFACE)
+        point = point.zxyw; /* the best pair is for a light's point, or the direction */
     const uint4 scramble = philox4x32((uint4)(key.pixel, randomization, number, interval), seed);
     return (uint4)(reverse_bits(owen_scramble(point.x, scramble.x)), reverse_bits(owen_scramble(point.y, scramble.y)),
                    reverse_bits(owen_scramble(point.z, scramble.z)), reverse_bits(owen_scramble(point.w, scramble.w)));
