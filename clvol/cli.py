@@ -14,8 +14,8 @@ from clvol.cli_compare import compare
 from clvol.cli_options import (
     INTERRUPTED,
     Definition,
-    ExplainedCommand,
     OneLineErrors,
+    RenderCommand,
     choice_options,
     finite,
 )
@@ -37,6 +37,7 @@ Examples:
   clvol render scenes/cloud.xml -o cloud.exr -D res=512 --majorant global
   clvol render scenes/cloud.xml -o cloud.exr --technique decomposition --transmittance residual-ratio
   clvol render scenes/smoke.xml -o smoke.exr --technique auto:pilot
+  clvol render scenes/cloud.xml -o cloud.exr --target-error 0.01
   clvol render scenes/fire.xml -o fire.exr --technique weighted-delta --majorant-scale 0.8
   clvol render scenes/smoke.xml -o smoke.exr --aov cells --aov largest_weight
 """
@@ -45,6 +46,9 @@ GROUP_EXAMPLES = """
 \b
 Examples:
   clvol render scenes/fire.xml -o fire.exr
+  clvol compare scenes/smoke.xml --techniques delta,spectral -o report/
+  clvol selftest scenes/smoke.xml --quick
+  clvol ray scenes/smoke.xml 100 60
   clvol info scenes/fire.vdb
   clvol devices
 """
@@ -75,7 +79,7 @@ def main(ctx: click.Context) -> None:
         click.echo(ctx.get_help())
 
 
-@main.command(cls=ExplainedCommand, epilog=RENDER_EXAMPLES)
+@main.command(cls=RenderCommand, epilog=RENDER_EXAMPLES)
 @click.argument("scene", metavar="SCENE")
 @click.option(
     "-o",
@@ -106,8 +110,7 @@ def main(ctx: click.Context) -> None:
     "--aov",
     multiple=True,
     metavar="NAME",
-    help="Add a picture of what walks count to the .exr: lookups, tentative, real, null, cells, violations, "
-    "largest_weight; may be given several times.",
+    help="Add a picture to the .exr, of those below; may be given several times.",
 )
 @click.option("--spp", type=click.IntRange(min=1), help="Samples per pixel; the scene's own by default.")
 @click.option(
@@ -227,9 +230,12 @@ def _summary(result: Result, outputs: tuple[str, ...]) -> Iterator[str]:
     yield f"{', '.join(outputs)}: {width} x {height} pixels, {count} spp"
     yield f"  {seconds:.2f} s, {rate:,.0f} samples/s, noise {format_noise(result.noise)}"
     choices = ("technique", "transmittance", "majorant", "lookup")
-    chosen = ", ".join(f"{key} {about[key]}" for key in choices)
+    used = [f"{key} {about[key]}" for key in choices if about[key] != "none" or key == "transmittance"]
     lookups = result.stats["lookups"] / max(width * height * count, 1)
-    yield f"  {chosen}; {lookups:.4g} look-ups per sample"
+    if used == ["transmittance none"]:
+        yield "  no media"
+    else:
+        yield f"  {', '.join(used)}; {lookups:.4g} look-ups per sample"
     if "pilot" in about:
         yield f"  pilot: {about['pilot_reason']}; repeat with {about['repeat']}"
 

@@ -137,3 +137,15 @@ class ExplainedCommand(click.Command):
                         [*automatic, *((name, entry.summary) for name, entry in entries.items())]
                     )
         super().format_epilog(ctx, formatter)
+
+
+class RenderCommand(ExplainedCommand):
+    """As `ExplainedCommand`, and what the pictures that --aov adds show."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write a section of the pictures before the rest."""
+        from clvol.registry import AOVS
+
+        with formatter.section("--aov"):
+            formatter.write_dl(list(AOVS.items()))
+        super().format_epilog(ctx, formatter)

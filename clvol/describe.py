@@ -52,8 +52,11 @@ def _dense_lines(grid: DenseGrid) -> Iterator[str]:
     plural = "s" if channels > 1 else ""
     yield f"{grid.name or 'grid'}: dense, {width} x {height} x {depth} samples, {channels} channel{plural}"
     yield f"  box      {_box(grid.box)}"
-    yield f"  values   {_number(grid.values.min())} to {_number(grid.values.max())}"
-    yield f"  sum      {_number(grid.values.sum(dtype=np.float64))}"
+    finite = grid.values[np.isfinite(grid.values)]
+    broken = grid.values.size - finite.size
+    extent = f"{_number(finite.min())} to {_number(finite.max())}" if finite.size else "none"
+    yield f"  values   {extent}" + (f"; {broken:,} are NaN or infinite" if broken else "")
+    yield f"  sum      {_number(finite.sum(dtype=np.float64))}"
     yield f"  memory   {format_bytes(grid.values.nbytes)}"
 
 

@@ -8,7 +8,7 @@
 # picture in the mean; they differ in what a sample costs and how much it varies.
 #
 # Run it cell by cell in any editor or notebook that knows `# %%`, or whole, from the folder of the
-# checkout: `python docs/tutorial.py`. It takes a minute or two on two cores, and leaves its files in
+# checkout: `python docs/tutorial.py`. It takes about three minutes on two cores, and leaves its files in
 # `tutorial/`.
 
 # %%

@@ -32,7 +32,10 @@ def read_volume(path: str | os.PathLike[str], grid: str | None = None) -> Grid:
     if suffix != ".vol":
         hint = "convert it to OpenVDB" if suffix == ".nvdb" else ""
         listed = f"{', '.join(SUPPORTED[:-1])} and {SUPPORTED[-1]}"
-        raise VolumeError(f"files ending in {suffix!r} cannot be read, {listed} can", str(path), hint)
+        if Path(path).is_dir():
+            raise VolumeError("is a folder", str(path), f"give a file: {listed} can be read")
+        what = f"files ending in {suffix!r}" if suffix else "files without a suffix"
+        raise VolumeError(f"{what} cannot be read, {listed} can", str(path), hint)
     if grid is not None:
         raise VolumeError(f"a .vol file has no grid named {grid!r}", str(path), "leave the name out")
     return read_vol(path)
