@@ -227,7 +227,8 @@ def _summary(result: Result, outputs: tuple[str, ...]) -> Iterator[str]:
     about, count = result.metadata, result.samples[1]
     seconds = about["seconds"]
     rate = width * height * count / max(seconds, 1e-9)
-    yield f"{', '.join(outputs)}: {width} x {height} pixels, {count} spp"
+    mean = " on the mean" if "target_error" in about else ""
+    yield f"{', '.join(outputs)}: {width} x {height} pixels, {count} spp{mean}"
     yield f"  {seconds:.2f} s, {rate:,.0f} samples/s, noise {format_noise(result.noise)}"
     choices = ("technique", "transmittance", "majorant", "lookup")
     used = [f"{key} {about[key]}" for key in choices if about[key] != "none" or key == "transmittance"]

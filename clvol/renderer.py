@@ -140,11 +140,14 @@ def _piloted(
         if callback is not None:
             callback(Progress(done, total, time.perf_counter() - started, what="pilot"))
 
-    found = pilot(device, scene, choices, seed=seed, spp=count, time_limit=time_limit, tell=tell)
+    even = replace(choices, target_error=None)  # its trials give every pixel as many samples
+    found = pilot(device, scene, even, seed=seed, spp=count, time_limit=time_limit, tell=tell)
     given = {f: n for f, n in choices.names.items() if n != "auto" and f not in found.names}
     options = " ".join([found.options, *(f"--{family} {name}" for family, name in given.items())])
     if choices.majorant_scale != 1:
         options += f" --majorant-scale {choices.majorant_scale:g}"
+    if choices.target_error is not None:
+        options += f" --target-error {choices.target_error:g}"
     repeat = f"clvol render {scene.source or 'SCENE'} … {' '.join(options.split())} --seed {seed}"
     log.info("pilot: %s; %s", ", ".join(f"{k} {v}" for k, v in found.names.items()), found.reason)
     log.info("pilot: repeat with %s", repeat)

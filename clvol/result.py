@@ -157,7 +157,7 @@ class Result:
             )
             for name, plane in self.aovs.items():
                 channels |= image_io.split_channels(name, plane)
-            image_io.write_exr(path, channels, self.metadata)
+            image_io.write_exr(path, channels, self.metadata | {"dof": self.dof})
 
 
 def merge(results: Iterable[Result]) -> Result:
@@ -197,6 +197,7 @@ def _check_same_render(one: Result, other: Result) -> None:
     """Raise OptionError where the two are not samples of the same picture."""
     pairs: dict[str, tuple[Any, Any]] = {
         "size": (one.image.shape[1::-1], other.image.shape[1::-1]),
+        "target_error": (one.metadata.get("target_error"), other.metadata.get("target_error")),
         "aovs": (sorted(one.aovs), sorted(other.aovs)),
     }
     for key in sorted((one.metadata.keys() | other.metadata.keys()) - _PER_RUN):

@@ -92,7 +92,8 @@ class Wavefront:
         self._allocate(buffers)
 
     def _allocate(self, scene_buffers: dict[str, cl.Buffer]) -> None:
-        ring_jobs = self.pass_samples * self.sample_jobs * self.pool.ring_passes
+        # of fewer pixels a pass may hold more jobs than of all, though not more than this
+        ring_jobs = max(self.pool.pass_jobs, self.sample_jobs) * self.pool.ring_passes
         sizes = {
             "render": self.render.nbytes,
             "state": 4 * len(self.fields) * self.stride,
