@@ -70,10 +70,15 @@ def family_options(command: Any) -> Any:
     type=click.FloatRange(min=0, min_open=True),
     callback=finite,
     metavar="SECONDS",
-    help="Seconds that each combination renders for, over all rounds; 10 by default. The reference takes "
-    "about ten times as long as one of them.",
+    help="Seconds that each combination renders for, over all rounds; 10 by default; with sampler "
+    "sobol the nearest that a power of two of samples allows. The reference takes about ten times as long as "
+    "one of them.",
 )
-@click.option("--spp", type=click.IntRange(min=1), help="Samples per pixel of one round instead.")
+@click.option(
+    "--spp",
+    type=click.IntRange(min=1),
+    help="Samples per pixel of one round instead; a power of two suits sampler sobol.",
+)
 @click.option(
     "--rounds",
     type=click.IntRange(min=4),

@@ -18,16 +18,18 @@ from clvol.choices import Choices
 from clvol.cli import main
 from clvol.comparison.combine import Lineup, open_lineup
 from clvol.comparison.figures import Comparison, compute_figures
-from clvol.comparison.measure import REFERENCE_SAMPLES, Plan, measure, seeds_from
+from clvol.comparison.measure import REFERENCE_SAMPLES, Measured, Plan, measure, seeds_from
 from clvol.comparison.names import names_asked, plural
 from clvol.comparison.reference import Reference, read_reference
 from clvol.comparison.report import as_json, check_folder, write_report
+from clvol.comparison.shorter import render_slope, shorter_spp
 from clvol.comparison.words import _slope
 from clvol.errors import OptionError
 from clvol.image_io import split_channels, write_exr
 from clvol.measure.efficiency import Interval, Work, compare_efficiency, error_products
 from clvol.measure.trials import Trial
 from clvol.registry import FAMILIES
+from clvol.sobol import RANDOMIZATIONS
 
 FALSE_ALARM = 1e-4
 SIZE = 16
@@ -55,6 +57,11 @@ def scene_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = folder / "a<b>&c.xml"
     path.write_text(CUBE)
     return path
+
+
+def film_only() -> SimpleNamespace:
+    """What a reference without a digest is compared with."""
+    return SimpleNamespace(film=SimpleNamespace(window=(0, 0, SIZE, SIZE)))
 
 
 class MadeUp:
@@ -87,7 +94,7 @@ def measured(trials: dict[str, MadeUp], plan: Plan) -> Comparison:
     )
     assert all(done <= total + 1e-6 for done, total, _ in told if total)
     labels = list(trials)
-    figures = compute_figures(found, reference, labels[0], reference.spp // len(reference.rounds))
+    figures = compute_figures(found, reference, labels[0])
     about = {"scene": "<i>x</i>", "rounds": len(found[0].seconds), "odd": float("nan")}
     return Comparison(figures, labels[0], reference, (), (), interrupted, about)
 
@@ -138,6 +145,9 @@ def test_rounds_take_equal_time_seeds_differ_and_the_reference_has_ten_times_the
     comparison = measured(trials, Plan(rounds=5, seconds=5.0, seed=7))
     fast, slow = (f.measured for f in comparison.figures)
     assert fast.spp == pytest.approx(4000, rel=0.01) and slow.spp == pytest.approx(1000, rel=0.01)
+    assert [*fast.shorter] == [fast.spp // 4, fast.spp // 16]
+    assert all(f.render_slope.low < -1 < f.render_slope.high for f in comparison.figures)
+    assert "compatible with the -1 of independent" in " ".join(comparison.words)
     seeds = [seed for trial in trials.values() for seed, _ in trial.renders]
     assert len(set(seeds)) == len(seeds) and min(seeds) == 7
     assert comparison.reference.spp == REFERENCE_SAMPLES * 5 * fast.spp  # fast is the more efficient
@@ -220,10 +230,95 @@ def test_a_planted_bias_is_seen_flattens_the_curve_and_is_told() -> None:
     assert "liar differs from the reference, though neither should be biased" in words
 
 
+def test_the_slope_of_one_render_over_its_samples_and_its_interval() -> None:
+    """Covers what it says, whatever the slope; one combination has -1.4 and is told from -1."""
+    random, comparisons, covered, steeper = np.random.default_rng(5), 1000, 0, 0
+    for _ in range(comparisons):
+        found = render_slope({n: n**-1.4 * random.chisquare(50, 10) / 50 for n in (64, 16, 4)})
+        covered += found.low <= -1.4 <= found.high
+        steeper += found.high < -1
+    assert covered >= stats.binom.ppf(FALSE_ALARM, comparisons, 0.95) and covered < comparisons
+    assert steeper > 0.9 * comparisons
+    assert shorter_spp(64) == (16, 4) and shorter_spp(15) == ()
+    assert np.isnan(render_slope({4: np.ones(10)}).value)
+
+
 def test_a_slope_that_chance_made_flat_is_not_called_bias() -> None:
     figures = measured({"good": MadeUp()}, Plan(rounds=4, spp=4))["good"]
-    flat = replace(figures, slope=Interval(-0.9, -0.95, -0.85))
-    assert "find no bias" in _slope(flat) and "flattens" not in _slope(flat)
+    flat, steep = (replace(figures, slope=Interval(*ends)) for ends in ((-0.9, -0.95, -0.85), (-2, -3, -1.5)))
+    assert "chance does that" in _slope(flat) and "flattens" not in _slope(flat)
+    assert "chance does that" in _slope(steep) and "separate renders of 4 spp" in _slope(steep)
+
+
+def rare(random: np.random.Generator, spp: int) -> np.ndarray:
+    """Grey light: 1, and one sample in 1024 of 256 more; float32 (SIZE, SIZE, 3)."""
+    bright = 256.0 * random.binomial(spp, 1 / 1024, (SIZE, SIZE, 1)) / spp
+    return np.repeat(1 + bright, 3, axis=-1).astype(np.float32)
+
+
+def test_rare_bright_samples_are_no_bias_against_a_given_reference(tmp_path: Path) -> None:
+    """Four samples of each pixel against thousands: a third of such pictures have seen no bright one, and are
+    certain of what they lack unless told by how many samples the reference is ahead."""
+    random, scene, spp = np.random.default_rng(3), film_only(), 1024
+    rounds = np.stack([rare(random, spp) for _ in range(16)])
+    truth = Reference.of_rounds(rounds, spp, "made up")
+    path = tmp_path / "reference.exr"
+    channels = split_channels("", truth.image) | split_channels("variance", truth.variance)
+    write_exr(path, channels, {"spp": truth.spp, "dof": 15})
+    given = read_reference(path, scene)
+    assert given.round_spp == spp
+    alarms = {name: 0 for name in ("as it is", "samples unknown")}
+    for _ in range(20):
+        images = np.stack([rare(random, 1) for _ in range(4)])
+        trial, ones = MadeUp(), np.ones(4)
+        found = [Measured("delta", trial, 1, images, ones, ones, (1, 2, 3, 4))]
+        for name, reference in (("as it is", given), ("samples unknown", replace(given, spp=None))):
+            alarms[name] += not compute_figures(found, reference, "delta")[0].verdict.agrees
+    assert alarms["as it is"] == 0 < 3 < alarms["samples unknown"]
+
+
+def test_a_given_variance_counts_with_the_freedom_it_has(tmp_path: Path, device, scene_file: Path) -> None:
+    scene, path = clvol.load_file(str(scene_file)), tmp_path / "few.exr"
+    result = clvol.render(scene, spp=8, technique="delta", sampler="sobol", seed=1)
+    result.save(path)
+    found = read_reference(path, scene)
+    assert len(found.rounds) == result.dof + 1 == RANDOMIZATIONS
+    np.testing.assert_allclose(found.rounds.var(axis=0, ddof=1) / 4, result.variance, rtol=1e-3, atol=1e-9)
+    away = (found.rounds - found.image)[:, (result.variance > 0).all(axis=-1)]
+    away /= np.sqrt(4 * result.variance[(result.variance > 0).all(axis=-1)])
+    np.testing.assert_allclose(away[..., 0], away[..., 2], atol=1e-2)  # channels share their noise
+
+
+def test_renders_that_draw_from_sobol_have_a_power_of_two_of_samples() -> None:
+    trials = {"a": MadeUp(rate=1100), "b": MadeUp(rate=3)}
+    plain = measured(trials, Plan(rounds=4, seconds=4.0))
+    assert plain["a"].measured.spp == pytest.approx(1100, abs=1)
+    trials["a"].names = {"technique": "delta", "sampler": "sobol"}
+    drawn = measured(trials, Plan(rounds=4, seconds=4.0))
+    assert [f.measured.spp for f in drawn.figures] == [1024, 4] and drawn.reference.spp == 4 * 8192
+    assert any("at 4 against 1024 spp a render" in text for text in drawn.words)
+    assert not any("Sobol'" in text for text in drawn.words)
+    assert any("it has 6" in text for text in measured(trials, Plan(rounds=4, spp=6)).words)
+
+
+def test_what_only_the_first_open_pays_for_is_not_the_first_combination_s(monkeypatch) -> None:
+    seconds = iter([0.319, 0.21, 0.21, 0.21])
+
+    def opened(_device, _scene, choices) -> MadeUp:
+        trial = MadeUp()
+        trial.precompute_seconds, trial.names = next(seconds), dict.fromkeys(FAMILIES, choices.technique)
+        return trial
+
+    monkeypatch.setattr("clvol.comparison.combine.Trial.open", opened)
+    scene = SimpleNamespace(integrator=SimpleNamespace(choices={}))
+    lineup = open_lineup(None, scene, names_asked({"techniques": "delta,spectral"}))
+    assert [trial.precompute_seconds for trial in lineup.trials.values()] == [0.21, 0.21]
+
+
+def test_the_table_cuts_no_name_however_long() -> None:
+    labels = [f"weighted-decomposition/residual-ratio/kdtree/stochastic/{'x' * 90}/{n}" for n in range(2)]
+    lines = repr(measured({label: MadeUp() for label in labels}, Plan(rounds=4, spp=4))).splitlines()
+    assert all(sum(label in line for line in lines[:-1]) == 1 for label in labels)
 
 
 def test_a_reference_without_variance_is_used_with_a_warning(
@@ -271,7 +366,7 @@ def test_the_report_is_whole_escaped_and_without_nan(tmp_path: Path) -> None:
     assert page.count("<img") == len([n for n in written["files"] if n.endswith(".png")]) + 1 + 3 * 2
     assert read_reference(
         tmp_path / "report" / "reference.exr",
-        SimpleNamespace(film=SimpleNamespace(window=(0, 0, SIZE, SIZE))),
+        film_only(),
     ).seeds  # a comparison's reference serves the next one
 
 

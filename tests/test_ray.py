@@ -179,6 +179,15 @@ def test_free_paths_and_transmittances_are_exact_in_the_mean(view, chromatic):
         assert abs(mean - exact) < bound * error, one.name
 
 
+def test_free_paths_beyond_a_window_are_not_in_its_last_bin(view):
+    """The same density inside, whether the edges end at the medium's or before."""
+    all_edges = np.linspace(0, view.place.length, 21)
+    for one in view.watched:
+        whole, part = (one.free_path_density(edges, 0) for edges in (all_edges, all_edges[3:12]))
+        for full, windowed in zip(whole, part, strict=True):
+            np.testing.assert_allclose(windowed, full[3:11], rtol=1e-12)
+
+
 def test_running_estimates_begin_at_1_and_end_at_the_walks_own(view):
     for one in view.watched:
         if one.family == "transmittance":

@@ -41,9 +41,9 @@ each in {rounds} rounds, with independent samples; errors are those against a re
 independent seeds, whose own variance is subtracted. Efficiency is 1 / (MSE × seconds),
 precomputation counted and kernel builds not, and 1 / (MSE × look-ups), as multiples of the first
 row's, with 95 % intervals; **bold** where the difference is significant (Holm). The slope is that
-of MSE over time: -1 where nothing is biased. "Bias seen" is the smallest relative bias of the image
-mean that the test against the reference would have noticed; its verdict has a false alarm once in
-10,000.
+of a render's MSE over its samples: -1 for independent samples without bias. "Bias seen" is the
+smallest relative bias of the image mean that the test against the reference would have noticed; its
+verdict has a false alarm once in 10,000.
 """
 SAMPLERS = """\
 ## Samplers
@@ -87,7 +87,7 @@ def compared(scene: str, sizes: dict[str, int], **options: object) -> Comparison
 def table(comparison: Comparison) -> list[str]:
     """Rows of a comparison as Markdown."""
     lines = [
-        "| | efficiency by time | by look-ups | look-ups a sample | slope | bias seen | agrees |",
+        "| | efficiency by time | by look-ups | look-ups a sample | slope over samples | bias seen | agrees |",
         "|---|---|---|---|---|---|---|",
     ]
     return lines + [row(figures) for figures in comparison.figures]
@@ -98,7 +98,7 @@ def row(figures: Figures) -> str:
     measured = figures.measured
     pixels = measured.images[0][..., 0].size
     lookups = measured.lookups.mean() / (pixels * measured.spp)
-    slope, verdict = figures.slope, figures.verdict
+    slope, verdict = figures.render_slope, figures.verdict
     efficiency = [shown(figures, cost) for cost in ("seconds", "lookups")]
     name = f"`{figures.label}`" + (" *biased*" if figures.biased else "")
     return (

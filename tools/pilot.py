@@ -14,7 +14,7 @@ from rich.progress import track
 
 from clvol.choices import Choices
 from clvol.device import open_device
-from clvol.measure.candidates import Candidate, Relative, inverse_efficiency, relative_efficiency
+from clvol.measure.candidates import Candidate, Relative, error, inverse_efficiency, relative_efficiency
 from clvol.measure.combinations import independent_seeds
 from clvol.measure.pilot import Found, Pilot
 from clvol.measure.quiet import quiet_renders
@@ -52,7 +52,9 @@ def measured(
             for n in range(len(again)):
                 again[(n + turn) % len(again)].render(next(seeds), AGAIN * pilot.spp)
     halves = {id(c): (half(c, 0), half(c, 1)) for c in again}
-    best = min(again, key=lambda c: inverse_efficiency(*figures(halves[id(c)][0])))
+    first = [halves[id(c)][0] for c in again]
+    costs = [inverse_efficiency(error(c, first), c.seconds, c.extra) for c in first]
+    best = again[costs.index(min(costs))]
     names = found.names
     chosen = next(c for c in again if all(getattr(c.trial.session.config, f) == n for f, n in names.items()))
     choice = halves[id(chosen)][1]
@@ -74,11 +76,6 @@ def half(candidate: Candidate, which: int) -> Candidate:
         candidate.seconds[which::2],
         AGAIN * candidate.extra,
     )
-
-
-def figures(candidate: Candidate) -> tuple:
-    """What `inverse_efficiency` takes."""
-    return candidate.variance, candidate.seconds, candidate.extra
 
 
 @click.command()

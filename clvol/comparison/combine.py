@@ -53,6 +53,8 @@ def open_lineup(
         opened(number, len(products))
         said = _said(wanted, varied)
         try:
+            if not trials:  # the first of a process pays for what the others find done: opened, and forgotten
+                Trial.open(device, scene, _choices(scene, wanted, step))
             trial = Trial.open(device, scene, _choices(scene, wanted, step))
         except OptionError as error:
             left_out.append((said, str(error)))

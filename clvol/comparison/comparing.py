@@ -49,8 +49,9 @@ def compare(
     Parameters
     ----------
     scene : from `load_file` or `load_dict`.
-    time_limit : seconds that each combination renders for, over all its rounds; 10 by default.  The reference
-        takes about ten times as long as one combination, unless it is given.
+    time_limit : seconds that each combination renders for, over all its rounds; 10 by default, and with
+        sampler sobol the nearest that a power of two of samples allows.  The reference takes about ten times
+        as long as one combination, unless it is given; renders with fewer samples a third as long.
     spp : samples per pixel of one round instead, for all alike.
     rounds : independent renders of each combination, at least 4.
     baseline : label of the combination that efficiencies are relative to; the first by default.
@@ -90,8 +91,7 @@ def compare(
         measured, truth, interrupted = measure(
             lineup, plan, given, lambda: Trial.open(opened, scene, Choices()), told
         )
-    per_round = truth.spp // len(truth.rounds) if given is None and truth.spp else None
-    figures = compute_figures(measured, truth, chosen, per_round)
+    figures = compute_figures(measured, truth, chosen)
     about = _about(scene, opened, plan, step, measured, truth)
     return Comparison(figures, chosen, truth, lineup.left_out, lineup.doubles, interrupted, about)
 

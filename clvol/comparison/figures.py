@@ -11,6 +11,7 @@ import numpy as np
 
 from clvol.comparison.measure import Measured
 from clvol.comparison.reference import Reference
+from clvol.comparison.shorter import render_slope
 from clvol.measure.agreement import Agreement, agreement
 from clvol.measure.efficiency import (
     Interval,
@@ -45,7 +46,8 @@ class Curve:
 
 @dataclass(frozen=True)
 class Efficiency:
-    """1 / (MSE · cost) of the mean of all rounds, precomputation counted where cost is seconds.
+    """1 / (MSE · cost) of the mean of all rounds, precomputation counted where cost is seconds.  It holds for
+    renders of as many samples as a round: those of sampler sobol gain with their number.
 
     Parameters
     ----------
@@ -82,7 +84,9 @@ class Figures:
     ----------
     mse, relmse : Curve of the absolute and of the relative error.
     seconds, lookups : float64 (rounds,): spent for the mean of 1, 2, … rounds, precomputation counted.
-    slope : of MSE over render time, with its band; -1 for an unbiased combination.
+    slope : of the MSE of means of separate renders over their number, with its band; -1 without bias.
+    render_slope : of the MSE of one render over its samples, with its 95 % interval; -1 for independent
+        samples without bias, nan where there are too few.
     squared_bias, relative_squared_bias : estimates, which may be negative by chance.
     efficiency : Efficiency by kind of cost, "seconds" and, where the density is looked up at all, "lookups".
     worst_round : share of the squared error that one round has.
@@ -95,6 +99,7 @@ class Figures:
     seconds: np.ndarray
     lookups: np.ndarray
     slope: Interval
+    render_slope: Interval
     squared_bias: float
     relative_squared_bias: float
     efficiency: dict[str, Efficiency]
@@ -165,10 +170,9 @@ class Comparison:
         return text_table(self)
 
 
-def compute_figures(
-    measured: list[Measured], reference: Reference, baseline: str, reference_spp: int | None = None
-) -> tuple[Figures, ...]:
-    """All figures of all combinations; `reference_spp` are the samples of one round of the reference."""
+def compute_figures(measured: list[Measured], reference: Reference, baseline: str) -> tuple[Figures, ...]:
+    """All figures of all combinations."""
+    per_round = reference.round_spp
     weight = relative_weight(reference.image)
     products = {m.label: error_products(m.images, reference.image, reference.variance) for m in measured}
     works = {
@@ -183,6 +187,7 @@ def compute_figures(
             m.trial.precompute_seconds + _running(m.seconds),
             _running(m.lookups),
             fitted_slope(products[m.label]),
+            _render_slope(m, products[m.label], reference),
             _bias(products[m.label]),
             _bias(relative),
             {cost: found[m.label] for cost, found in efficiency.items() if m.label in found},
@@ -192,7 +197,7 @@ def compute_figures(
                 m.images,
                 reference.rounds,
                 alpha=ALPHA,
-                spp=(m.spp, reference_spp) if reference_spp else None,
+                spp=(m.spp, per_round) if per_round else None,
             ),
         )
         for m in measured
@@ -212,6 +217,13 @@ def _running(cost: np.ndarray) -> np.ndarray:
 def _curve(products: np.ndarray) -> Curve:
     low, high = np.quantile(convergence_bands(products), [0.025, 0.975], axis=0)
     return Curve(convergence(products), low, high)
+
+
+def _render_slope(measured: Measured, products: np.ndarray, reference: Reference) -> Interval:
+    errors = {measured.spp: np.diag(products)}
+    for spp, images in measured.shorter.items():
+        errors[spp] = np.diag(error_products(images, reference.image, reference.variance))
+    return render_slope(errors)
 
 
 def _bias(products: np.ndarray) -> float:

@@ -32,7 +32,7 @@ th, td { padding: 6px 10px; border-bottom: 1px solid var(--line); text-align: ri
 th { color: var(--soft); font-weight: 600; } th:first-child, td:first-child { text-align: left; }
 table.left th, table.left td { text-align: left; }
 .plots { display: flex; flex-wrap: wrap; gap: 16px; } .plots img { width: 100%; }
-.plots figure { flex: 1 1 440px; max-width: 540px; } 
+.plots figure { flex: 1 1 440px; max-width: 540px; }
 .plots figure.wide { flex-basis: 100%; max-width: 900px; }
 figure { margin: 0; } figcaption { font-size: 13px; margin-top: 2px; }
 .pictures { display: flex; flex-wrap: wrap; gap: 14px; } .pictures figure { flex: 0 1 246px; }
@@ -111,7 +111,8 @@ def _summary(comparison: Comparison) -> str:
     note = (
         f"Relative RMSE and largest error: of the mean of all rounds; relative to F² + ({DARK:g} · mean F)², "
         "F being the reference, whose own variance is subtracted. Efficiency: times the baseline's, with its "
-        f"95 % interval; * significantly different. Verdicts raise a false alarm with probability {ALPHA:g}."
+        "95 % interval, for renders of as many samples as the table says (sampler sobol gains with their "
+        f"number); * significantly different. Verdicts raise a false alarm with probability {ALPHA:g}."
     )
     return _table(*table_rows(comparison)) + f'<p class="note">{escape(note)}</p>'
 
@@ -123,10 +124,10 @@ def _plots(drawn: dict[str, bytes]) -> str:
         wide = ' class="wide"' if name == "efficiency" else ""
         figures.append(f"<figure{wide}>{_img(png, caption)}<figcaption>{caption}</figcaption></figure>")
     note = (
-        "Errors of the mean of the first 1, 2, … rounds, averaged over every order of the rounds; bands are "
-        "95 % bootstraps over rounds. Independent samples without bias follow the dashed line, but for "
-        "precomputation, which moves curves over time to the right; bias flattens. Fitted slopes are over "
-        "render time alone."
+        "Errors of means of k = 1, 2, … separate renders, averaged over every order of them; bands are 95 % "
+        "bootstraps over renders, on the wide side. Means of separate renders without bias follow the dashed "
+        "line, whatever the sampler, but for precomputation, which moves curves over time to the right; bias "
+        "flattens. Fitted slopes are over k."
     )
     return f'<div class="plots">{"".join(figures)}</div><p class="note">{escape(note)}</p>'
 

@@ -8,18 +8,21 @@ import logging
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from clvol.comparison.combine import Lineup
 from clvol.comparison.reference import Reference
+from clvol.comparison.shorter import shorter_spp
 from clvol.measure.efficiency import LEAST_ROUNDS
+from clvol.measure.quiet import log_filter
 from clvol.measure.trials import Trial, rounds
 from clvol.result import Result
 
 REFERENCE_SAMPLES = 10
-"""The reference has so many times the samples that its combination has in all rounds together."""
+"""The reference has about so many times the samples that its combination has in all rounds together."""
 _TRIAL_SECONDS = 0.3
 
 Told = Callable[[float, float, str], None]
@@ -33,7 +36,8 @@ class Plan:
     Parameters
     ----------
     rounds : of every combination.
-    seconds : that each combination renders for, over all its rounds; the reference apart.
+    seconds : that each combination renders for, over all its rounds; the reference and shorter renders apart.
+        With sampler sobol it is what comes nearest with a power of two of samples.
     spp : samples per pixel of one round instead, for all alike.
     reference_spp : samples per pixel of the reference; None takes `REFERENCE_SAMPLES` times those of all
         rounds of the combination that it is made with.
@@ -57,6 +61,7 @@ class Measured:
     seconds, lookups : float64 (rounds,): of each render.
     seeds : of each render.
     notes : warnings it gave, each once.
+    shorter : images of as many renders with fewer samples, by samples of a render.
     """
 
     label: str
@@ -67,6 +72,21 @@ class Measured:
     lookups: np.ndarray
     seeds: tuple[int, ...]
     notes: tuple[str, ...] = ()
+    shorter: dict[int, np.ndarray] = field(default_factory=dict)
+
+
+class _Render(NamedTuple):
+    """What is kept of a Result."""
+
+    image: np.ndarray
+    seconds: float
+    lookups: float
+    seed: int
+
+    @classmethod
+    def of(cls, result: Result) -> _Render:
+        stats = result.stats
+        return cls(result.image, stats["seconds"]["render"], float(stats["lookups"]), result.metadata["seed"])
 
 
 @dataclass(eq=False)
@@ -118,12 +138,8 @@ def _noted(notes: dict[str, str]) -> Iterator[None]:
         notes.setdefault(wording, record.getMessage())
         return not known
 
-    logger = logging.getLogger("clvol")
-    logger.addFilter(first_time)
-    try:
+    with log_filter(first_time):
         yield
-    finally:
-        logger.removeFilter(first_time)
 
 
 def seeds_from(seed: int, taken: tuple[int, int] | None = None) -> Iterator[int]:
@@ -150,16 +166,21 @@ def measure(
     entrants = [_Entrant(label, trial, clock.tick) for label, trial in lineup.trials.items()]
     for entrant in entrants:
         entrant.try_out(seeds, plan.spp)
-        entrant.spp = plan.spp or max(1, round(plan.seconds / plan.rounds / max(entrant.pace, 1e-9)))
-    running = list(entrants)
+        entrant.spp = plan.spp or _samples(plan.seconds / plan.rounds / max(entrant.pace, 1e-9), lineup)
+    shorter = [
+        (e, spp, replace(e, spp=spp, label=f"{e.label}, {spp} spp"))
+        for e in entrants
+        for spp in shorter_spp(e.spp)
+    ]
+    running = [*entrants, *(short for *_, short in shorter)]
     if given is None:
-        running.append(_reference_entrant(entrants, plan, spare, seeds, clock))
+        running.append(_reference_entrant(entrants, lineup, plan, spare, seeds, clock))
     clock.expect({e.label: e.pace * e.spp for e in running}, plan.rounds)
-    done: list[list[Result]] = []
+    done: list[list[_Render]] = []
     interrupted = False
     try:
         for results in rounds(running, [e.spp for e in running], seeds):
-            done.append(results)
+            done.append([_Render.of(result) for result in results])
             if len(done) == plan.rounds:
                 break
     except KeyboardInterrupt:
@@ -168,41 +189,61 @@ def measure(
         interrupted = True
     columns = list(zip(*done, strict=True))
     measured = [_measured(e, column) for e, column in zip(entrants, columns, strict=False)]
+    for (entrant, spp, _), column in zip(shorter, columns[len(entrants) :], strict=False):
+        measured[entrants.index(entrant)].shorter[spp] = np.stack([r.image for r in column])
     if given is None:
         made = running[-1]
         images = np.stack([r.image for r in columns[-1]])
         seen = f"{made.trial.options or 'closed forms'}; {len(done)} rounds of {made.spp} spp"
-        seeds_used = [r.metadata["seed"] for r in columns[-1]]
+        seeds_used = [r.seed for r in columns[-1]]
         source = f"made with {seen}, seeds of its own"
         given = Reference.of_rounds(images, made.spp, source, (min(seeds_used), max(seeds_used)))
     return measured, given, interrupted
 
 
+def _samples(wanted: float, lineup: Lineup) -> int:
+    """Samples of a render, at least 1.  Where sampler sobol takes part, a power of two from 4 on for all:
+    others cost it some of its gain."""
+    if any(uses_sobol(trial) for trial in lineup.trials.values()):
+        return 2 ** max(2, round(math.log2(max(wanted, 1.0))))
+    return max(1, round(wanted))
+
+
+def uses_sobol(trial: Trial) -> bool:
+    """Whether the number of samples matters to its efficiency."""
+    return trial.names.get("sampler") == "sobol"
+
+
 def _reference_entrant(
-    entrants: list[_Entrant], plan: Plan, spare: Callable[[], Trial], seeds: Iterator[int], clock: _Clock
+    entrants: list[_Entrant],
+    lineup: Lineup,
+    plan: Plan,
+    spare: Callable[[], Trial],
+    seeds: Iterator[int],
+    clock: _Clock,
 ) -> _Entrant:
     """The most efficient unbiased combination of the trial, again, with many more samples."""
     unbiased = [e for e in entrants if not e.trial.biased]
     if not unbiased:
         unbiased = [_Entrant("auto", spare(), clock.tick)]
         unbiased[0].try_out(seeds, plan.spp)
-        unbiased[0].spp = plan.spp or max(1, round(plan.seconds / plan.rounds / unbiased[0].pace))
+        unbiased[0].spp = plan.spp or _samples(plan.seconds / plan.rounds / unbiased[0].pace, lineup)
     best = min(unbiased, key=lambda e: e.variance * e.pace)
-    spp = REFERENCE_SAMPLES * best.spp
+    spp = _samples(REFERENCE_SAMPLES * best.spp, lineup)
     if plan.reference_spp is not None:
         spp = math.ceil(plan.reference_spp / plan.rounds)
     return _Entrant("reference", best.trial, clock.tick, best.notes, spp, best.pace, best.variance)
 
 
-def _measured(entrant: _Entrant, results: tuple[Result, ...]) -> Measured:
+def _measured(entrant: _Entrant, results: tuple[_Render, ...]) -> Measured:
     return Measured(
         entrant.label,
         entrant.trial,
         entrant.spp,
         np.stack([r.image for r in results]),
-        np.array([r.stats["seconds"]["render"] for r in results]),
-        np.array([float(r.stats["lookups"]) for r in results]),
-        tuple(r.metadata["seed"] for r in results),
+        np.array([r.seconds for r in results]),
+        np.array([r.lookups for r in results]),
+        tuple(r.seed for r in results),
         tuple(entrant.notes.values()),
     )
 

@@ -13,7 +13,8 @@ from clvol.scene.digest import scene_digest
 from clvol.scene.records import Scene
 
 log = logging.getLogger("clvol")
-_STAND_INS = 16
+_MANY = 15
+"""Degrees of freedom of a given variance that does not say how many it has, and the most that count."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +49,11 @@ class Reference:
         mean = rounds.mean(axis=0, dtype=np.float64)
         variance = rounds.var(axis=0, ddof=1, dtype=np.float64) / len(rounds)
         return cls(mean, variance, rounds, spp * len(rounds), source, seeds=seeds)
+
+    @property
+    def round_spp(self) -> float | None:
+        """Samples per pixel of each of `rounds`; None where that is not known."""
+        return self.spp / len(self.rounds) if self.spp else None
 
     @property
     def product_error(self) -> float:
@@ -96,7 +102,7 @@ def read_reference(path: str | os.PathLike[str], scene: Scene) -> Reference:
     return Reference(
         image,
         variance,
-        _stand_ins(image, variance),
+        _stand_ins(image, variance, _freedom(metadata)),
         int(metadata["spp"]) if "spp" in metadata else None,
         f"given: {os.path.basename(where)}",
         known,
@@ -127,6 +133,14 @@ def _read_planes(where: str) -> tuple[dict[str, np.ndarray], dict[str, object]]:
     return {name: pixels[..., n] for n, name in enumerate(names)}, metadata
 
 
+def _freedom(metadata: dict[str, object]) -> int:
+    """Degrees of freedom of the variance: few where sampler sobol rendered it."""
+    try:
+        return min(max(int(metadata.get("dof", _MANY)), 1), _MANY)
+    except (TypeError, ValueError):
+        return _MANY
+
+
 def _seeds(metadata: dict[str, object]) -> tuple[int, int] | None:
     """First and last seed: "seed" of a render, "seeds" of an earlier comparison's reference."""
     words = str(metadata.get("seeds", metadata.get("seed", ""))).split()
@@ -144,10 +158,12 @@ def _warn_of_doubts(where: str, metadata: dict[str, object], known: bool, scene:
         log.warning("%s is biased itself (%s)", where, metadata["biased"])
 
 
-def _stand_ins(image: np.ndarray, variance: np.ndarray) -> np.ndarray:
-    """Rounds that have exactly this mean and this variance of the mean: what a test between stacks takes
-    when the rounds themselves are gone."""
-    noise = np.random.default_rng(1).standard_normal((_STAND_INS, *image.shape))
+def _stand_ins(image: np.ndarray, variance: np.ndarray, dof: int) -> np.ndarray:
+    """Rounds that have exactly this mean and this variance of the mean, with as many degrees of freedom: what
+    a test between stacks takes when the rounds themselves are gone.  Channels share their noise, as they do
+    where paths carry them together: no certainty comes of taking their mean."""
+    count = dof + 1
+    noise = np.random.default_rng(1).standard_normal((count, *image.shape[:2], 1))
     noise -= noise.mean(axis=0)
-    noise *= np.sqrt(variance * _STAND_INS) / noise.std(axis=0, ddof=1)
+    noise = noise / noise.std(axis=0, ddof=1) * np.sqrt(variance * count)
     return (image + noise).astype(np.float32)

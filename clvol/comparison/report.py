@@ -9,9 +9,12 @@ report.json holds, numbers as numbers and unknown ones as null:
   - label, options, names (by family), biased, notes, spp, seeds, precompute_seconds, kernel_seconds
   - round_seconds, round_lookups: of each round
   - curve: seconds, lookups (spent for the mean of 1, 2, … rounds); mse, relmse, rmse, relrmse, each value,
-    low, high
-  - slope: value, low, high; squared_bias, relative_squared_bias; worst_round_share
-  - efficiency: by "seconds" and "lookups": value, ratio {value, low, high}, p, adjusted_p, significant
+    low, high: of means of separate renders
+  - slope (over the number of renders), render_slope (of one render, over its samples): value, low, high
+  - squared_bias, relative_squared_bias
+  - worst_round_share
+  - efficiency (of renders of spp samples) by "seconds" and "lookups": value, ratio {value, low, high}, p,
+    adjusted_p, significant
   - largest_error: x, y, channel, difference, deviation
   - verdict: the fields of `clvol.measure.agreement.Agreement`
 """
@@ -118,7 +121,8 @@ def _fill(comparison: Comparison, folder: Path) -> None:
 def _reference_metadata(comparison: Comparison) -> dict[str, Any]:
     about = comparison.about
     known = {"scene": about.get("scene"), "digest": about.get("digest"), "version": about.get("clvol")}
-    known |= {"spp": comparison.reference.spp, "reference": comparison.reference.source}
+    known |= {"spp": comparison.reference.spp, "dof": len(comparison.reference.rounds) - 1}
+    known |= {"reference": comparison.reference.source}
     if comparison.reference.seeds is not None:
         known["seeds"] = "{} {}".format(*comparison.reference.seeds)
     return {name: value for name, value in known.items() if value is not None}
@@ -171,6 +175,7 @@ def _combination(f: Figures) -> dict[str, Any]:
             "relrmse": _ends(f.relmse, 0.5),
         },
         "slope": f.slope,
+        "render_slope": f.render_slope,
         "squared_bias": f.squared_bias,
         "relative_squared_bias": f.relative_squared_bias,
         "worst_round_share": f.worst_round,

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from clvol.comparison.figures import COSTS, LEVEL, Comparison, Efficiency, Figures
+from clvol.comparison.measure import uses_sobol
 from clvol.measure.efficiency import Interval
 
 _HEAVY = 0.5
@@ -34,26 +35,29 @@ def sentences(comparison: Comparison) -> list[Sentence]:
     found = [Sentence("finding", text) for cost in COSTS for text in _efficiency(comparison, cost)]
     for figures in comparison.figures:
         found += [Sentence("verdict", _verdict(figures)), Sentence("verdict", _slope(figures))]
+        if math.isfinite(figures.render_slope.value):
+            found.append(Sentence("verdict", _render_slope(figures)))
     return found + [Sentence("warning", text) for text in _warnings(comparison)]
 
 
 def _efficiency(comparison: Comparison, cost: str) -> Iterator[str]:
     known = {f.label: f.efficiency[cost] for f in comparison.figures if cost in f.efficiency}
+    spp = {f.label: f.measured.spp for f in comparison.figures}
     if not known:
         return
     base = comparison.baseline
     others = {label: e for label, e in known.items() if label != base}
     for label, e in sorted(others.items(), key=lambda item: -item[1].ratio.value):
-        yield f"By {COSTS[cost]}, {label} is {_said(e)} as efficient as {base}{_significance(e)}."
+        at = f"{spp[label]}" if spp[label] == spp[base] else f"{spp[label]} against {spp[base]}"
+        yield (
+            f"By {COSTS[cost]}, {label} is {times(e.ratio)} times as efficient as {base} "
+            f"at {at} spp a render{_significance(e)}."
+        )
     if len(others) > 1 and any(math.isfinite(e.adjusted_p) for e in others.values()):
         yield (
             f"Significant by {COSTS[cost]} means that the chance of calling any of these {len(others)} "
             f"wrongly different from {base} is {LEVEL:.0%} (Holm's correction); intervals are 95 % each."
         )
-
-
-def _said(e: Efficiency) -> str:
-    return f"{times(e.ratio)} times"
 
 
 def _significance(e: Efficiency) -> str:
@@ -80,27 +84,42 @@ def _verdict(figures: Figures) -> str:
 
 def _slope(figures: Figures) -> str:
     label, slope = figures.label, figures.slope
+    means = f"MSE of means of k separate renders of {figures.measured.spp} spp falls over k with slope"
     if not math.isfinite(slope.value):
         return f"{label}: the slope of its error is unknown, the error is too near the reference's."
     low = f"{slope.low:.2f}" if math.isfinite(slope.low) else "-∞"
     band = f"{slope.value:.2f} ({low} to {slope.high:.2f})"
-    if slope.low > -1 and figures.verdict.agrees and not figures.biased:
-        return (
-            f"{label}'s MSE falls over time with slope {band}, a little flatter than -1; chance does that a "
-            "few times in a hundred, and the tests against the reference find no bias."
-        )
-    if slope.low > -1:
+    if slope.low > -1 and (figures.biased or not figures.verdict.agrees):
         floor = math.sqrt(max(figures.relative_squared_bias, 0.0))
         return (
-            f"{label} flattens: its MSE falls over time with slope {band} where noise alone has -1; more "
-            f"samples do not bring its relative RMSE below about {floor:.2g}, which is bias."
+            f"{label} flattens: the {means} {band} where noise alone has -1; more samples do not bring its "
+            f"relative RMSE below about {floor:.2g}, which is bias."
         )
-    if slope.high < -1:
-        return f"{label}'s MSE falls over time with slope {band}, faster than independent samples' -1."
+    if not slope.low <= -1 <= slope.high:
+        than = "flatter" if slope.low > -1 else "steeper"
+        return (
+            f"{label}'s {means} {band}, a little {than} than the -1 of noise alone; chance does that to "
+            "about 3 in 100 unbiased combinations"
+            + ("." if figures.biased else ", and the tests against the reference decide on bias.")
+        )
     hidden = (
         ", so that its bias hides in its noise here" if figures.biased else ", as noise without bias does"
     )
-    return f"{label}'s MSE falls over time with slope {band}, compatible with -1{hidden}."
+    return f"{label}'s {means} {band}, compatible with -1{hidden}."
+
+
+def _render_slope(figures: Figures) -> str:
+    slope, measured = figures.render_slope, figures.measured
+    meaning = "compatible with the -1 of independent samples"
+    if slope.high < -1:
+        meaning = "faster than the -1 of independent samples"
+    elif slope.low > -1:
+        meaning = "slower than the -1 of independent samples"
+    return (
+        f"The MSE of one render of {figures.label} falls over its samples, {min(measured.shorter)} to "
+        f"{measured.spp} spp, with slope {slope.value:.2f} (95 %: {slope.low:.2f} to {slope.high:.2f}), "
+        f"{meaning}."
+    )
 
 
 def _warnings(comparison: Comparison) -> Iterator[str]:
@@ -131,6 +150,12 @@ def _warnings(comparison: Comparison) -> Iterator[str]:
                 f"{figures.label} is biased: its efficiency is that of a render as long as all its rounds, "
                 "and is less for longer ones."
             )
+        spp = figures.measured.spp
+        if uses_sobol(figures.measured.trial) and (spp < 4 or spp & (spp - 1)):
+            yield (
+                f"{figures.label} draws from Sobol' sequences, whose gain is full at 4, 8, 16, … samples a "
+                f"render; it has {spp}."
+            )
         for note in figures.measured.notes:
             yield f"{figures.label}: {note}."
 
@@ -139,12 +164,14 @@ def table_rows(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
     """Headings and rows of the summary."""
     heads = [
         "combination",
+        "spp a render",
         "rel. RMSE",
         "seconds",
         "look-ups per sample",
         "efficiency by time",
         "by look-ups",
-        "slope",
+        "slope over renders",
+        "over samples",
         "largest error",
         "agrees",
     ]
@@ -153,16 +180,17 @@ def table_rows(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
         pixels = f.measured.images[0, ..., 0].size
         per_sample = float(f.measured.lookups.mean()) / (pixels * f.measured.spp)
         ratios = [_cell(f, cost, comparison.baseline) for cost in COSTS]
-        slope = f"{f.slope.value:.2f}" if math.isfinite(f.slope.value) else "–"
+        slopes = [f"{s.value:.2f}" if math.isfinite(s.value) else "–" for s in (f.slope, f.render_slope)]
         agrees = ("yes" if f.verdict.agrees else "NO") + (" (biased)" if f.biased else "")
         rows.append(
             [
                 f.label,
+                str(f.measured.spp),
                 f"{math.sqrt(max(f.relmse.value[-1], 0.0)):.3g}",
                 f"{f.seconds[-1]:.3g}",
                 f"{per_sample:.3g}",
                 *ratios,
-                slope,
+                *slopes,
                 f"{f.largest_error.difference:+.2g}",
                 agrees,
             ]
@@ -179,8 +207,8 @@ def _cell(figures: Figures, cost: str, baseline: str) -> str:
     return times(e.ratio).replace(" to ", "–") + (" *" if e.significant else "")
 
 
-def text_table(comparison: Comparison, width: int = 160) -> str:
-    """The summary as plain text."""
+def text_table(comparison: Comparison) -> str:
+    """The summary as plain text, as wide as it needs to be: nothing is cut or folded."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
@@ -192,7 +220,7 @@ def text_table(comparison: Comparison, width: int = 160) -> str:
         table.add_column(head, justify="left" if number == 0 else "right")
     for row in rows:
         table.add_row(*map(Text, row))
-    console = Console(file=io.StringIO(), width=width, color_system=None)
+    console = Console(file=io.StringIO(), width=10_000, color_system=None)
     console.print(table)
     note = f"* significantly different from {comparison.baseline}"
     lines = [line.rstrip() for line in console.file.getvalue().splitlines()]

@@ -158,6 +158,29 @@ def convergence_bands(products: np.ndarray, resamples: int = 1000, seed: int = 1
     return bias[:, None] + (one - bias)[:, None] / np.arange(1, count + 1)
 
 
+def pair_error(pairs: np.ndarray) -> tuple[float, float]:
+    """Standard error of the mean of `pairs` off their diagonal, and its degrees of freedom.
+
+    pairs : float64 (rounds, rounds), symmetric: one number for each pair of independent rounds.  What a round
+    does to all of its pairs is told from what is a pair's own (analysis of variance): without a bias there is
+    only the latter, and the jackknife would then claim twice its variance.
+    """
+    count = len(pairs)
+    away = pairs - np.diag(np.diag(pairs))
+    away -= (away.sum() / (count * (count - 1))) * (1 - np.eye(count))
+    by_round = away.sum(axis=1) / (count - 2)
+    between = (by_round**2).sum() * (count - 2) / (count - 1)
+    own = away - (by_round[:, None] + by_round) * (1 - np.eye(count))
+    rest = count * (count - 3) / 2
+    within = (own**2).sum() / 2 / rest
+    of_rounds = 4 / (count * (count - 2)) if between > within else 0.0
+    parts = np.array([of_rounds * between, (2 / (count * (count - 1)) - of_rounds) * within])
+    variance = float(parts.sum())
+    if variance <= 0:
+        return 0.0, rest
+    return math.sqrt(variance), variance**2 / float((parts**2 / [count - 1, rest]).sum())
+
+
 def slopes(curves: np.ndarray) -> np.ndarray:
     """Least-squares slope of log(MSE) over log(rounds) of each row, rounds spread evenly on that axis; -inf
     where an MSE comes out as 0 or less."""
@@ -169,14 +192,20 @@ def slopes(curves: np.ndarray) -> np.ndarray:
 
 
 def fitted_slope(products: np.ndarray, level: float = 0.95) -> Interval:
-    """Slope of the `convergence` and its bootstrap band: -1 for an unbiased estimator, more for a biased one.
+    """Slope of the `convergence` of means of separate rounds, and its band: -1 without bias, more with one.
 
-    The band is on the safe side: resampled products off the diagonal spread more than their mean does.
+    It follows from the share of the bias in one round's error, and its band from that share's interval; nan
+    where there is no error.  At 10 rounds it lies above -1 in 1.3 % of unbiased comparisons and below -1 in
+    1.4 % (simulated; rather more with a bias, less with fewer rounds), and below -1 in up to 5 % where rare
+    bright pixels make all the noise.
     """
-    resampled = np.sort(slopes(convergence_bands(products)))
-    tail = (1 - level) / 2
-    low, high = (resampled[round(q * (len(resampled) - 1))] for q in (tail, 1 - tail))
-    return Interval(float(slopes(convergence(products)[None])[0]), float(low), float(high))
+    one, bias = noise_and_bias(products)
+    if not one > 0:
+        return Interval(math.nan, math.nan, math.nan)
+    share, errors = bias / one, np.diag(products)
+    error, freedom = pair_error((products - share * (errors[:, None] + errors) / 2) / one)
+    shares = share + error * float(stdtrit(freedom, (1 + level) / 2)) * np.array([[0], [-1], [1]])
+    return Interval(*slopes(shares + (1 - shares) / np.arange(1, len(products) + 1)).tolist())
 
 
 def compare_efficiency(ours: Work, theirs: Work, level: float = 0.95) -> Ratio:

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 
 
 @contextmanager
-def quiet_renders() -> Iterator[None]:
-    """Drops what is logged of single renders; loggers below "clvol" still speak."""
+def log_filter(keep: Callable[[logging.LogRecord], bool]) -> Iterator[None]:
+    """Only what `keep` says is logged of single renders; loggers below "clvol" still speak."""
     log = logging.getLogger("clvol")
-
-    def keep(record: logging.LogRecord) -> bool:
-        return record.levelno > logging.WARNING
-
     log.addFilter(keep)
     try:
         yield
     finally:
         log.removeFilter(keep)
+
+
+def quiet_renders() -> AbstractContextManager[None]:
+    """Drops all but errors."""
+    return log_filter(lambda record: record.levelno > logging.WARNING)

@@ -142,9 +142,9 @@ class Watched:
         """Density of free paths between `edges`, weighted, and its standard error, float64 (bins,)."""
         count, bins = len(self.outcomes), len(edges) - 1
         t = self.outcomes[:, 0].astype(np.float64)
-        hit = t >= 0
+        hit = (t >= edges[0]) & (t <= edges[-1])  # those that go further count as walks, not as collisions
         weights = self.outcomes[hit, 1 + channel].astype(np.float64)
-        place = np.clip(np.searchsorted(edges, t[hit], side="right") - 1, 0, bins - 1)
+        place = np.minimum(np.searchsorted(edges, t[hit], side="right") - 1, bins - 1)
         mean = np.bincount(place, weights, bins) / count
         square = np.bincount(place, weights**2, bins) / count
         error = np.sqrt(np.maximum(square - mean**2, 0.0) / count)
