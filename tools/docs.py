@@ -87,7 +87,7 @@ def compared(scene: str, sizes: dict[str, int], **options: object) -> Comparison
 def table(comparison: Comparison) -> list[str]:
     """Rows of a comparison as Markdown."""
     lines = [
-        "| | efficiency by time | by look-ups | look-ups a sample | slope over samples | bias seen | agrees |",
+        "| | efficiency by time | by look-ups | look-ups a sample | slope | bias seen | agrees |",
         "|---|---|---|---|---|---|---|",
     ]
     return lines + [row(figures) for figures in comparison.figures]
