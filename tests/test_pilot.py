@@ -18,7 +18,7 @@ from clvol.cli import main
 from clvol.config import KernelConfig
 from clvol.errors import OptionError
 from clvol.measure import pilot as pilots
-from clvol.measure.candidates import Candidate, halve, precomputation, relative_efficiency
+from clvol.measure.candidates import Candidate
 from clvol.measure.combinations import independent_seeds, unbiased
 from clvol.scene.records import ConstantEmitter, DirectionalEmitter
 
@@ -34,36 +34,42 @@ def lumps(scale=(3.0,)):
     return gridded(volume(np.random.default_rng(1).random((5, 6, 7)), *CUBE), 0.7, scale=scale)
 
 
-# -- planted efficiencies -----------------------------------------------------------------------------
+# -- made-up candidates ---------------------------------------------------------------------------
 
 
-def planted(deviation, seconds, rounds=4, seed=1, extra=0.0):
-    """A candidate with noise of a known deviation."""
-    rng = np.random.default_rng(seed)
-    images = list(rng.normal(1.0, deviation, (rounds, 32, 32, 3)))
-    return Candidate(f"{deviation} {seconds}", None, images, [seconds] * rounds, extra)
+def test_both_kinds_of_seconds_are_of_the_same_clock(monkeypatch):
+    """Processor seconds on a processor: what waits for other programs counts in neither."""
+    now = {"process_time": 0.0, "perf_counter": 0.0}
+    for name in now:
+        monkeypatch.setattr(f"time.{name}", lambda name=name: now[name])
 
+    def work(own, waiting):
+        now["process_time"] += own
+        now["perf_counter"] += own + waiting
 
-def test_relative_efficiency_is_that_of_variance_times_seconds():
-    base, quieter, slower = planted(0.2, 1.0, seed=1), planted(0.1, 1.0, seed=2), planted(0.2, 3.0, seed=3)
-    for one, expected in ((quieter, 4.0), (slower, 1 / 3)):
-        found = relative_efficiency(one, base)
-        assert found.low < expected < found.high and found.high / found.low < 1.4
-    assert relative_efficiency(base, base).value == 1.0
-    assert relative_efficiency(planted(0.0, 1.0), planted(0.0, 1.0)).value == 1.0  # black pictures
+    class Session(SimpleNamespace):
+        setup_seconds, kernel_seconds, config = 4.0, 3.0, SimpleNamespace()
+        image, stats = np.zeros((2, 2, 3)), {"largest_weight": 1.0}
+        restart = result = lambda self, *_: self
+        run = lambda *_: work(6.0, 50.0)  # noqa: E731
+        choices = lambda _: dict.fromkeys(pilots.CHOSEN, "x")  # noqa: E731
 
+        @classmethod
+        def open(cls, device, *_):
+            work(8.0, 5.0)
+            return cls(device=device)
 
-def test_halving_keeps_the_better_half_and_counts_precomputation():
-    a, b, c = planted(0.2, 1.0, seed=1), planted(0.1, 1.0, seed=2), planted(0.2, 0.1, seed=3)
-    assert halve([a, b, c]) == [c, b] and halve([a, b]) == [b]
-    c.extra = 1.0
-    assert halve([a, b, c]) == [b, a]
-
-
-def test_precomputation_counts_in_proportion_to_the_render():
-    assert precomputation(2.0, 0.1, rounds=100.0, limit=None) == pytest.approx(0.02)
-    assert precomputation(2.0, 0.1, rounds=None, limit=4.0) == pytest.approx(0.1)  # half the time is left
-    assert precomputation(5.0, 0.1, rounds=None, limit=4.0) == np.inf
+    monkeypatch.setattr(pilots, "Session", Session)
+    monkeypatch.setattr(pilots, "prepare_for", lambda *_: work(3.0, 70.0))
+    device = SimpleNamespace(is_cpu=True, info=SimpleNamespace(compute_units=2))
+    run = pilots.Pilot(
+        device, scene(lumps(), (SKY,)), Choices(), independent_seeds(0, "pilot"), 4, None, None
+    )
+    run.small = run.scene
+    candidate = run._open(run.choices)
+    candidate.render(1, 4)
+    assert candidate.seconds == [3.0]  # two threads
+    assert candidate.trial.precompute_seconds == pytest.approx(3.0 + 8.0 / 4)  # the rest built kernels
 
 
 FACTORS = {
@@ -79,6 +85,19 @@ class MadeUpPilot(pilots.Pilot):
 
     factors = FACTORS
     rendered = 0
+    stage = ""
+
+    def slowness(self, stage, auto):
+        """Multiplies the seconds of a round."""
+        return 1.0
+
+    def _stage(self, family, best, auto):
+        self.stage = family
+        return super()._stage(family, best, auto)
+
+    def _confirmed(self, best, auto):
+        self.stage = "final"
+        return super()._confirmed(best, auto)
 
     def _open(self, choices):
         resolved = resolve(self.features, choices.names)
@@ -93,7 +112,8 @@ class MadeUpPilot(pilots.Pilot):
         def render(seed, spp):
             rng = np.random.default_rng(seed)
             candidate.images.append(rng.normal(1.0, 0.1, (16, 16, 3)))
-            candidate.seconds.append(0.02 / efficiency)
+            slowness = self.slowness(self.stage, candidate is self.candidates[0])
+            candidate.seconds.append(0.02 / efficiency * slowness)
             self.__class__.rendered += 1
 
         candidate.render = render
@@ -104,9 +124,9 @@ class MadeUpPilot(pilots.Pilot):
         return True
 
 
-def made_up(choices, medium=None, factors=FACTORS):
+def made_up(choices, medium=None, factors=FACTORS, **members):
     lit = scene(medium or lumps(), (SKY, SUN))
-    kind = type("Made", (MadeUpPilot,), {"factors": factors})
+    kind = type("Made", (MadeUpPilot,), {"factors": factors} | members)
     run = kind(None, lit, choices, independent_seeds(0, "pilot"), 64, None, None, True)
     return run.found(), run
 
@@ -141,6 +161,24 @@ def test_the_pilot_is_short():
     counts = [len(unbiased(family)) for family in pilots.CHOSEN]
     assert type(run).rendered <= 1 + pilots.ROUNDS * sum(2 * count + 3 for count in counts)
     assert run.seconds <= run.budget * 1.5
+
+
+def test_a_choice_that_was_lucky_while_it_was_chosen_is_not_taken():
+    """Twice as fast as auto's in the rounds that select, as fast in those that follow."""
+    none = {family: {} for family in pilots.CHOSEN}
+    lucky = lambda _, stage, auto: 1.0 if auto or stage == "final" else 0.5  # noqa: E731
+    found, _ = made_up(Choices(), factors=none, slowness=lucky)
+    if found.relative.value != 1.0:  # by noise, but not by what was lucky
+        assert found.relative.high < 1.5
+    steady, _ = made_up(Choices(), factors=none, slowness=lambda _, stage, auto: 1.0 if auto else 0.5)
+    assert steady.relative.low > 1.5
+
+
+def test_a_best_that_became_slow_is_still_there():
+    """All the others far slower than auto's, from the second family on."""
+    slow = lambda _, stage, auto: 1.0 if auto or stage == "technique" else 1000.0  # noqa: E731
+    found, run = made_up(Choices(), slowness=slow)
+    assert list(found.names.values()) == run.candidates[0].label.split(" + ")
 
 
 def test_what_was_given_is_kept():
@@ -192,6 +230,16 @@ def test_the_picture_is_that_of_the_choice_with_the_same_seed(caplog, monkeypatc
     again = clvol.render(lit, spp=4, seed=9, **options)
     assert np.array_equal(found.image, again.image) and np.array_equal(found.variance, again.variance)
     assert len(set(seeds)) == len(seeds) and 9 not in seeds
+
+
+def test_a_pilot_before_a_render_to_a_target_error():
+    sampler, lit = "independent", scene(homogeneous(1.0, 0.5), (SKY,))
+    found = clvol.render(lit, seed=9, technique="auto:pilot", target_error=0.1, sampler=sampler)
+    assert found.metadata["sampler"] == sampler and found.metadata["target_error"] == 0.1
+    assert f"--sampler {sampler}" in found.metadata["repeat"] and found.noise < 0.15
+    assert (
+        "of transmittance" in found.metadata["pilot_reason"] and "nan" not in found.metadata["pilot_reason"]
+    )
 
 
 def test_auto_pilot_is_a_technique_of_renders_alone(tmp_path):

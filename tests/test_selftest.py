@@ -16,7 +16,7 @@ from clvol.errors import OptionError
 from clvol.features import Features
 from clvol.measure import judgement
 from clvol.measure.combinations import KEYS, covering, in_force, independent_seeds, unbiased, usable
-from clvol.measure.judgement import common_choice, judge
+from clvol.measure.judgement import judge
 from clvol.measure.reduced import reduced
 from clvol.measure.selftests import SelfTest
 from clvol.registry import FAMILIES
@@ -112,9 +112,57 @@ def test_the_one_that_is_wrong_is_the_one_that_is_named():
 
 def test_what_the_wrong_ones_share_is_named():
     tested = made_up(np.random.default_rng(1), GRID, lambda technique, e: 0.9 if e == "ratio" else 1.0)
-    judge(tested, 1e-4)
-    assert sum(not one.agrees for one in tested) == 3
-    assert common_choice(tested) == "Of the 3 that use transmittance ratio, 3 of 3 disagree."
+    found = judge(tested, 1e-4)
+    assert [one.names["transmittance"] for one in tested if not one.agrees] == ["ratio"] * 3
+    (contrast,) = found.guilty
+    assert contrast.why.startswith("The 3 combinations of transmittance ratio DISAGREE with the 6 others")
+
+
+def test_a_bias_that_many_share_is_not_hidden_in_what_they_are_compared_with():
+    """Of the least size that the self-test says it sees: two thirds of the combinations, then half of them.
+    The test of each combination alone, against a pool of mostly guilty ones, sees far less."""
+    clean = made_up(np.random.default_rng(1), GRID)
+    limit = max(judge(clean, 1e-4).limits)
+    seen, tries = 0, 15
+    for n in range(tries):
+        tested = made_up(np.random.default_rng(n), GRID, lambda t, e: 1.0 if e == "ratio" else 1 + limit)
+        (contrast, *_) = judge(tested, 1e-4).guilty or [None]
+        seen += contrast is not None and len(contrast.accused) == 3
+    assert seen >= stats.binom.ppf(1e-4, tries, 0.95)
+    assert limit < 0.7 * min(one.agreement.smallest_bias for one in clean)
+
+
+def test_of_an_even_split_both_sides_are_named():
+    pairs = [(t, e) for t in ("delta", "regular", "spectral") for e in ("ratio", "regular")]
+    tested = made_up(np.random.default_rng(1), pairs, lambda t, e: 1.1 if e == "ratio" else 1.0)
+    (contrast,) = judge(tested, 1e-4).guilty
+    assert "of transmittance ratio DISAGREE with the 3 of transmittance regular" in contrast.why
+    assert "cannot be told" in contrast.why and not any(one.agrees for one in tested)
+
+
+def by_chance(rng, choices, chance):
+    """The light is sampled by the first half, and found by the others: with a small chance in a pixel."""
+    tested = made_up(rng, choices)
+    for n, one in enumerate(tested):
+        one.names["lights"] = "sampled" if n < len(tested) / 2 else "found"
+        if one.names["lights"] == "found":
+            one.images = (rng.random((4, 16, 16, 1)) < chance) / chance * np.ones(3)
+            one.found = 1 / chance
+    return tested
+
+
+@pytest.mark.parametrize("chance", [1e-5, 1e-3])
+def test_lights_found_by_chance_alone_leave_it_open(chance):
+    """No hit of the light in 1024 chances, or a few in some tiles and none in others: no accusation."""
+    for seed in range(10):
+        tested = by_chance(np.random.default_rng(seed), GRID, chance)
+        judged = judge(tested, 1e-2)
+        assert all(one.agrees for one in tested) and not judged.guilty
+        assert all(one.doubtful is (one.found > 0) for one in tested)
+    for one in tested:
+        one.found = 0.0
+    judge(tested, 1e-2)
+    assert chance == 1e-3 or not all(one.agrees for one in tested)  # black pictures, if it were not known
 
 
 def test_of_two_both_are_named_and_large_weights_leave_it_open():
@@ -192,7 +240,7 @@ def test_a_sound_scene_passes_and_a_planted_bias_does_not(tmp_path, monkeypatch)
     monkeypatch.setattr(programs, "kernel_source", source)
     wrong = run(tmp_path, "--time", "0.5")
     assert wrong.exit_code == 1, wrong.output
-    assert "DISAGREES with the others" in wrong.stdout.splitlines()[-1]
+    assert "DISAGREE" in wrong.stdout.splitlines()[-1]
     found = clvol.selftest(clvol.load_file(tmp_path / "scene.xml"), quick=True, spp=128)
     assert not found.passed
     accused = {one.names["lights"] for one in found.disagreeing}  # those who sample lights, or who find them

@@ -4,6 +4,10 @@ A round is one render; rounds are few, but pixels are many and independent of ea
 a tile's mean is pooled: the sum over its pixels of the variance between rounds, whose degrees of freedom are
 Satterthwaite's over the pixels of both stacks (Welch's t).  Where one bright pixel makes all the noise they
 fall to those of that pixel, so that heavy tails make the test doubtful of itself, not alarmed.
+
+A stack that missed a rare bright sample is darker and looks certain of it.  No difference is therefore held
+to be less probable than that the darker stack has missed the samples that make it up: e^-n for n of them,
+each as bright as the largest it is known to draw.
 """
 
 from __future__ import annotations
@@ -57,16 +61,30 @@ class Agreement:
 
 class _Means(NamedTuple):
     """Means over regions of an image; the variance of one round of each, with the variance of that variance
-    (halved) for a normal distribution: arrays (regions y, regions x, planes)."""
+    (halved) for a normal distribution: arrays (regions y, regions x, planes).
+
+    pixels : of a region, (regions y, regions x, 1).
+    largest : what one sample is known to add to a pixel of a round, (planes,).
+    """
 
     mean: np.ndarray
     variance: np.ndarray
     doubt: np.ndarray
     rounds: int
+    pixels: np.ndarray
+    largest: np.ndarray
+
+    @property
+    def unit(self) -> np.ndarray:
+        """What the largest sample adds to a region's mean."""
+        return self.largest / (self.pixels * self.rounds)
 
 
 class _Tests(NamedTuple):
-    """Tests of regions, arrays (regions y, regions x, planes).  level : mean of both, its absolute value."""
+    """Tests of regions, arrays (regions y, regions x, planes).
+
+    level : mean of both, its absolute value.  unit : what the largest sample adds to the mean of either.
+    """
 
     difference: np.ndarray
     error: np.ndarray
@@ -74,6 +92,7 @@ class _Tests(NamedTuple):
     t: np.ndarray
     p: np.ndarray
     level: np.ndarray
+    unit: np.ndarray
 
 
 def agreement(
@@ -82,6 +101,7 @@ def agreement(
     tile: int = 8,
     alpha: float = 1e-4,
     spp: tuple[int, int] | None = None,
+    largest: tuple[float, float] = (0.0, 0.0),
 ) -> Agreement:
     """Test whether two stacks of renders have the same expectation.
 
@@ -95,6 +115,8 @@ def agreement(
     spp : samples per pixel in a round of `a` and of `b`.  Give it wherever one stack is much longer than the
         other: the shorter is then taken to be no quieter per sample than the longer, since a few samples that
         have missed a rare bright one believe themselves to be certain, and raise false alarms.
+    largest : what a single sample of `a` and of `b` may add to a pixel of a round, where that is known to be
+        more than the rounds show.
 
     Raises
     ------
@@ -106,7 +128,10 @@ def agreement(
     if broken:
         return Agreement(False, 0.0, 0.0, (0, 0), math.inf, math.inf, f"{broken} values are not finite")
     a, b = _planes(a, b)
-    tiles, image = (_welch(_means(a, edge), _means(b, edge), spp) for edge in (tile, max(a.shape[1:3])))
+    tiles, image = (
+        _welch(_means(a, edge, largest[0]), _means(b, edge, largest[1]), spp)
+        for edge in (tile, max(a.shape[1:3]))
+    )
     y, x = np.unravel_index(np.argmin(tiles.p), tiles.p.shape)[:2]
     mean_p = min(1.0, 2 * image.p.size * float(image.p.min()))
     tile_p = min(1.0, 2 * tiles.p.size * float(tiles.p.min()))
@@ -137,17 +162,26 @@ def _planes(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate([a, grey[0]], axis=-1), np.concatenate([b, grey[1]], axis=-1)
 
 
-def _means(stack: np.ndarray, edge: int) -> _Means:
+def region_sums(plane: np.ndarray, edge: int) -> np.ndarray:
+    """Sums over squares of edge² pixels; (height, width, …) to (regions y, regions x, …)."""
+    rows = np.add.reduceat(plane, np.arange(0, plane.shape[0], edge), axis=0)
+    return np.add.reduceat(rows, np.arange(0, plane.shape[1], edge), axis=1)
+
+
+def _means(stack: np.ndarray, edge: int, largest: float) -> _Means:
     """Means of square regions of pixels, with the variance pooled over the pixels of each."""
-    variance = stack.var(axis=0, ddof=1)
-
-    def total(plane: np.ndarray) -> np.ndarray:
-        rows = np.add.reduceat(plane, np.arange(0, plane.shape[0], edge), axis=0)
-        return np.add.reduceat(rows, np.arange(0, plane.shape[1], edge), axis=1)
-
-    pixels = total(np.ones((*variance.shape[:2], 1)))
-    doubt = total(variance**2) / (len(stack) - 1) / pixels**4
-    return _Means(total(stack.mean(axis=0)) / pixels, total(variance) / pixels**2, doubt, len(stack))
+    rounds, mean, variance = len(stack), stack.mean(axis=0), stack.var(axis=0, ddof=1)
+    pixels = region_sums(np.ones((*mean.shape[:2], 1)), edge)
+    doubt = region_sums(variance**2, edge) / (rounds - 1) / pixels**4
+    excess = (stack - mean).max(axis=(0, 1, 2)) * rounds / (rounds - 1)  # the sample moves the mean too
+    return _Means(
+        region_sums(mean, edge) / pixels,
+        region_sums(variance, edge) / pixels**2,
+        doubt,
+        rounds,
+        pixels,
+        np.maximum(excess, largest),
+    )
 
 
 def _welch(a: _Means, b: _Means, spp: tuple[int, int] | None) -> _Tests:
@@ -167,15 +201,29 @@ def _welch(a: _Means, b: _Means, spp: tuple[int, int] | None) -> _Tests:
     level = (np.abs(a.mean) + np.abs(b.mean)) / 2
     error = np.hypot(np.sqrt(variance), ROUNDING * level)
     t = np.divide(a.mean - b.mean, error, out=np.zeros_like(error), where=error > 0)
-    return _Tests(a.mean - b.mean, error, freedom, t, 2 * stdtr(freedom, -np.abs(t)), level)
+    p = 2 * stdtr(freedom, -np.abs(t))
+    for dark, bright in ((a, b), (b, a)):
+        p = np.maximum(p, _missed(dark, bright))
+    return _Tests(a.mean - b.mean, error, freedom, t, p, level, np.maximum(a.unit, b.unit))
+
+
+def _missed(dark: _Means, bright: _Means) -> np.ndarray:
+    """Probability of having missed all samples that `dark` lacks, each its largest (Poisson); 0 where it is
+    not darker."""
+    lacking, unit = bright.mean - dark.mean, np.broadcast_to(dark.unit, dark.mean.shape)
+    known = (lacking > 0) & (unit > 0)
+    return np.exp(-np.divide(lacking, unit, out=np.full_like(lacking, math.inf), where=known))
 
 
 def _smallest_bias(image: _Tests, level: float) -> float:
     """Relative bias of the grey mean that a two-sided test of `level` detects with probability POWER."""
-    freedom, error, mean = (float(x[0, 0, -1]) for x in (image.freedom, image.error, image.level))
+    freedom, error, mean, unit = (
+        float(x[0, 0, -1]) for x in (image.freedom, image.error, image.level, image.unit)
+    )
     if mean == 0:
         return math.inf
-    return float(stdtrit(freedom, 1 - level / 2) + stdtrit(freedom, POWER)) * error / mean
+    seen = float(stdtrit(freedom, 1 - level / 2) + stdtrit(freedom, POWER)) * error
+    return max(seen, math.log(1 / level) * unit + float(stdtrit(freedom, POWER)) * error) / mean
 
 
 def _explanation(found: Agreement, image: _Tests, tiles: _Tests, alpha: float) -> str:

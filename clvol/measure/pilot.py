@@ -1,15 +1,15 @@
 """A short measured pilot that picks technique, transmittance and majorant by 1 / (variance · seconds).
 
 One family after the other, what was best so far with each of the family's choices in turn: rounds by turns on
-a small film, after which the worse half is dropped (successive halving), until one is left.  Seeds are others
-than the picture's, so that its samples owe nothing to the choice.
+a small film, after which the worse half is dropped (successive halving), until one is left.  Further rounds
+say whether it is better than auto's rules: those that chose it among many flatter it.  Seeds are others than
+the picture's, so that its samples owe nothing to the choice.
 """
 
 from __future__ import annotations
 
 import logging
 import math
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
@@ -18,7 +18,15 @@ from clvol.config import KernelConfig
 from clvol.device import Device
 from clvol.errors import OptionError
 from clvol.features import Features
-from clvol.measure.candidates import Candidate, Relative, halve, precomputation, relative_efficiency
+from clvol.measure.candidates import (
+    Candidate,
+    Relative,
+    clock,
+    doubtful,
+    halve,
+    precomputation,
+    relative_efficiency,
+)
 from clvol.measure.combinations import independent_seeds, unbiased
 from clvol.measure.quiet import quiet_renders
 from clvol.measure.reduced import reduced
@@ -36,6 +44,8 @@ SHARE, LEAST_SECONDS, MOST_SECONDS = 0.1, 5.0, 120.0
 """Of the expected render, and the bounds of what a pilot may take; kernel builds come on top."""
 ROUNDS = 2
 """Of every candidate between two halvings."""
+FINAL_ROUNDS = 4
+"""Of the choice and of auto's, by turns, which say what it is worth."""
 SPENT = {"technique": 0.4, "transmittance": 0.8, "majorant": 1.0}
 """Share of its time that a pilot may have used after a family; it stops halving there."""
 WORTH = 1.05
@@ -106,7 +116,8 @@ class Pilot:
     ) -> None:
         self.keep = keep  # candidates that are out stay open, to be measured again
         self.device, self.scene, self.seeds = device, scene, seeds
-        self.choices, self.time_limit = choices, time_limit
+        self.choices = replace(choices, target_error=None)  # rounds have as many samples in every pixel
+        self.time_limit = time_limit
         self.samples = None if spp >= MAX_SAMPLES else spp
         self.tell = tell or (lambda done, total: None)
         self.features = Features.from_scene(scene)
@@ -126,20 +137,32 @@ class Pilot:
         self._plan(auto, film[2] * film[3])
         for family in self.open:
             best = self._stage(family, best, auto)
-        if best is not auto and relative_efficiency(best, auto).value < WORTH:
-            best = auto
-        return self._report(best, auto)
+        relative = self._confirmed(best, auto)
+        return self._report(best if relative.value >= WORTH else auto, auto, relative)
+
+    def _confirmed(self, best: Candidate, auto: Candidate) -> Relative:
+        """Efficiency of the choice over auto's, by rounds that did not choose it."""
+        if best is auto:
+            return Relative(1.0, 1.0, 1.0)
+        both, first = (best, auto), (len(best.images), len(auto.images))
+        for turn in range(FINAL_ROUNDS):
+            for candidate in both if turn % 2 else both[::-1]:
+                self._render(candidate)
+        fresh = [candidate.since(n) for candidate, n in zip(both, first, strict=True)]
+        return Relative(0.0, 0.0, 0.0) if doubtful(*fresh, fresh) else relative_efficiency(*fresh)
 
     def _open(self, choices: Choices) -> Candidate:
         """A candidate; scenes prepared for the same needs are prepared once."""
         needs = majorant_needs(choices, resolve(self.features, choices.names))
         if needs not in self.prepared:
-            started = time.perf_counter()
-            self.prepared[needs] = prepare_for(self.small, choices), time.perf_counter() - started
+            started = clock(self.device)
+            self.prepared[needs] = prepare_for(self.small, choices), clock(self.device) - started
         prepared, seconds = self.prepared[needs]
+        started = clock(self.device)
         session = Session.open(self.device, prepared, choices, 0)
+        spent = clock(self.device) - started
         self.kernel_seconds += session.kernel_seconds
-        seconds += session.setup_seconds - session.kernel_seconds
+        seconds += spent * (1 - session.kernel_seconds / session.setup_seconds)
         names = session.choices()
         label = " + ".join(names[family] for family in CHOSEN)
         self.candidates.append(Candidate(label, Trial(session, choices, names, seconds)))
@@ -153,7 +176,7 @@ class Pilot:
         auto.images.clear()
         expected = self.time_limit or each * pixels * self.samples
         self.budget = min(max(SHARE * expected, LEAST_SECONDS), MOST_SECONDS)
-        self.planned = sum(ROUNDS * 2 * len(unbiased(family)) for family in self.open)
+        self.planned = sum(ROUNDS * 2 * len(unbiased(family)) for family in self.open) + 2 * FINAL_ROUNDS
         samples = self.budget / (max(self.planned, 1) * each * _TYPICAL)
         least = _LEAST_PATHS / auto.trial.session.config.jobs_per_sample
         self.spp = 2 ** max(1, round(math.log2(max(samples, least) / count)))
@@ -168,8 +191,9 @@ class Pilot:
             for turn in range(ROUNDS):
                 for n in range(len(measured)):
                     self._render(measured[(n + turn) % len(measured)])
-                measured = [c for c in measured if c.seconds[-1] < HOPELESS * auto.seconds[-1]]
-            kept = halve([c for c in candidates if c in measured])
+                slow = HOPELESS * auto.seconds[-1]
+                measured = [c for c in measured if c in (candidates[0], auto) or c.seconds[-1] < slow]
+            kept = halve([c for c in candidates if c in measured], auto, measured)
             self._close([c for c in candidates if c not in kept and c is not auto])
             candidates = kept
             if log.isEnabledFor(logging.INFO):
@@ -231,18 +255,17 @@ class Pilot:
     def _figure(self, candidate: Candidate, auto: Candidate) -> str:
         return f"{candidate.label} {relative_efficiency(candidate, auto)}"
 
-    def _report(self, best: Candidate, auto: Candidate) -> Found:
+    def _report(self, best: Candidate, auto: Candidate, relative: Relative) -> Found:
         """The choice, with its reason."""
         config, names = best.trial.session.config, best.trial.session.choices()
         chosen = {f: getattr(config, f) for f in CHOSEN if getattr(config, f) in FAMILIES[f]}
         numbers = ", ".join(f"{count} of {family}" for family, count in self.considered.items() if count > 1)
-        relative = Relative(1.0, 1.0, 1.0)
         if not numbers:
             reason = "this scene leaves nothing to choose"
         elif best is auto:
+            relative = Relative(1.0, 1.0, 1.0)
             reason = f"auto's own rules are the best or within {WORTH - 1:.0%} of it, of {numbers}"
         else:
-            relative = relative_efficiency(best, auto)
             reason = f"{relative} times as efficient as auto's {auto.label}, best of {numbers}"
         if numbers:
             reason += f"; {self.seconds:.1f} s of rendering, {self.kernel_seconds:.1f} s of kernel builds"

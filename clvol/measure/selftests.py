@@ -11,7 +11,7 @@ import itertools
 import math
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,8 +19,15 @@ from clvol.choices import Choices
 from clvol.device import Device, open_device
 from clvol.errors import OptionError
 from clvol.features import Features
-from clvol.measure.combinations import biased, covering, independent_seeds, names_in_force, options_of
-from clvol.measure.judgement import Tested, common_choice, judge
+from clvol.measure.combinations import (
+    LIGHTS,
+    biased,
+    covering,
+    independent_seeds,
+    names_in_force,
+    options_of,
+)
+from clvol.measure.judgement import Judgement, Tested, judge
 from clvol.measure.quiet import quiet_renders
 from clvol.measure.reduced import reduced
 from clvol.measure.trials import Trial, rounds
@@ -57,6 +64,7 @@ class SelfTest:
     pairs, all_pairs : pairs of choices that occur together in a combination, and that could.
     left_out : biased choices, which are not tested.
     seconds : of everything.
+    judgement : of the choices, as contrasts of those that use one with those that don't.
     """
 
     tested: list[Tested]
@@ -68,6 +76,7 @@ class SelfTest:
     all_pairs: int
     left_out: list[str]
     seconds: float
+    judgement: Judgement = field(default_factory=lambda: Judgement((), ()))
 
     @property
     def disagreeing(self) -> list[Tested]:
@@ -86,30 +95,27 @@ class SelfTest:
 
     @property
     def biases(self) -> np.ndarray:
-        """Relative bias of each combination's image mean that would have been seen; empty where there was
-        nothing to compare."""
-        return np.array([t.agreement.smallest_bias for t in self.tested if t.agreement])
+        """Relative bias of each combination's and each choice's image mean that would have been seen, but for
+        doubtful ones; empty where there was nothing to compare."""
+        own = [t.agreement.smallest_bias for t in self.tested if t.agreement and not t.doubtful]
+        return np.array([*own, *self.judgement.limits])
 
     @property
     def smallest_bias(self) -> float:
-        """Relative bias that would have been seen in any combination; nan where there was one only."""
+        """Relative bias that would have been seen in any of them; nan where there was nothing to compare."""
         return float(self.biases.max()) if self.biases.size else math.nan
 
     @property
     def verdict(self) -> str:
         """What was found, in plain words."""
-        parts = [f"{t.called} DISAGREES with the others: {t.why}." for t in self.disagreeing]
-        if suspect := common_choice(self.tested):
-            parts.append(suspect)
+        parts = [contrast.why for contrast in self.judgement.guilty]
+        shared = [t for contrast in self.judgement.guilty for t in contrast.accused]
+        single = [t for t in self.disagreeing if t not in shared]
+        parts += [f"{t.called} DISAGREES with the others: {t.why}." for t in single]
         parts += [f"{t.called} is FAULTY: {', '.join(t.faults)}." for t in self.faulty]
         if not parts:
             parts.append(self._praise())
-        parts += [
-            f"Undecided: {t.called}; {t.why}, but weights grew to {t.largest_weight:.2g}, and samples it "
-            "has not seen may be the reason."
-            for t in self.tested
-            if t.doubtful
-        ]
+        parts += [f"Undecided: {t.called}; {t.why}, but {_doubt(t)}." for t in self.tested if t.doubtful]
         return " ".join(parts)
 
     def _praise(self) -> str:
@@ -117,17 +123,27 @@ class SelfTest:
             return f"The picture is black, in {len(self.tested)} of {len(self.tested)} combinations."
         if len(self.tested) == 1:
             return "There is only one way to render this scene, so nothing to compare; its samples are sound."
+        if not self.biases.size:
+            return "All combinations are too noisy to compare."
         count = sum(not t.doubtful for t in self.tested)
         words = (
             f"All {count} combinations agree."
             if count == len(self.tested)
             else f"{count} combinations agree."
         )
-        seen = f"{words} A bias of {100 * self.smallest_bias:.2g} % of any one's mean would have been seen"
+        seen = f"{words} A bias of {100 * self.smallest_bias:.2g} % of any choice's mean would have been seen"
         middle = float(np.median(self.biases))
         if self.smallest_bias > 2 * middle:
             return f"{seen}, and of {100 * middle:.2g} % of most."
         return f"{seen}."
+
+
+def _doubt(one: Tested) -> str:
+    """Why a combination is undecided."""
+    if one.heavy:
+        return f"weights grew to {one.largest_weight:.2g}, and samples it has not seen may be the reason"
+    rare = " and finds lights by chance alone" if one.names.get(LIGHTS) == "found" else ""
+    return f"it is so noisy{rare} that a black picture would have been no alarm"
 
 
 def selftest(
@@ -174,10 +190,19 @@ def selftest(
         if spp is None:
             spp, count = affordable(trials, seconds or effort.seconds, seeds)
         tested = _rendered(trials, spp, count, seeds, tell)
-    judge(tested, alpha)
+    for one in tested:
+        one.found = brightest_light(small) / spp if one.names[LIGHTS] == "found" else 0.0
+    judgement = judge(tested, alpha)
     size = small.film.window[2:]
     elapsed = time.perf_counter() - started
-    return SelfTest(tested, alpha, size, spp, count, pairs, all_pairs, biased(), elapsed)
+    return SelfTest(tested, alpha, size, spp, count, pairs, all_pairs, biased(), elapsed, judgement)
+
+
+def brightest_light(scene: Scene) -> float:
+    """Largest radiance, in any channel, of the lights that a path can find by chance."""
+    surfaces = [shape.emission for shape in scene.shapes if shape.emission is not None]
+    around = [light.radiance for light in scene.emitters if hasattr(light, "radiance")]
+    return max((float(np.max(radiance)) for radiance in (*surfaces, *around)), default=0.0)
 
 
 def open_covering(
