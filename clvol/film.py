@@ -47,7 +47,8 @@ class Film:
         self.seed = seed
         for buffer in self.buffers.values():
             cl.enqueue_fill_buffer(self.device.queue, buffer, np.uint32(0), 0, buffer.size)
-        self.samples = np.zeros(self.pixels, np.int64)  # of each pixel, where they are not the same of all
+        listed = self.pixels if self.config.pixel_list else 0
+        self.samples = np.zeros(listed, np.int64)  # of each pixel, where they are not the same of all
         self.slot_totals = dict.fromkeys(layout.slot_fields(self.config), 0.0)
 
     def _read(self, name: str, shape: tuple[int, ...], dtype: type) -> np.ndarray:

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 from clvol import registry
 from clvol.adaptive import TargetRender
@@ -19,7 +20,10 @@ from clvol.errors import OptionError
 from clvol.progress import Progress, ProgressCallback, RichProgress
 from clvol.result import Result
 from clvol.scene.records import Scene
-from clvol.session import MAX_SAMPLES, Session
+from clvol.session import MAX_SAMPLES, Session, seed_words
+
+if TYPE_CHECKING:
+    from clvol.measure.pilot import Found
 
 log = logging.getLogger("clvol")
 
@@ -103,11 +107,12 @@ def render(
         raise OptionError("target_error and samples exclude each other", hint="spp says how many at most")
     first, count = _sample_range(scene, spp, time_limit, samples)
     seed = scene.seed if seed is None else seed
+    seed_words(seed)  # refuses what is none, before a device is opened
     bar = RichProgress() if progress is True else nullcontext(progress or None)
-    opened, about = open_device(device), {}
+    opened = open_device(device)
     if piloted:
         with bar as callback:
-            choices, about = _piloted(opened, scene, choices, seed, count, time_limit, callback)
+            choices, found, given = _piloted(opened, scene, choices, seed, count, time_limit, callback)
     session = Session.for_scene(opened, scene, choices, seed, pool)
     session.describe()
     session.warn_of_unused(asked)
@@ -118,7 +123,15 @@ def render(
             done = TargetRender(session, target_error, spp).run(time_limit, callback, interrupted)
     result = session.result(first, done)
     result.stats["interrupted"] = bool(interrupted())
-    result.metadata |= about | ({"target_error": target_error} if target_error is not None else {})
+    if target_error is not None:
+        result.metadata["target_error"] = target_error
+    if piloted:
+        from clvol.measure.repeat import repeat_command
+
+        # a time limit is repeated by the samples it was enough for
+        extent = {"spp": first + done} if target_error is None else {"spp": spp, "time": time_limit}
+        repeat = repeat_command(scene, found.options, given | extent | {"seed": seed, "device": device})
+        result.metadata |= {"pilot": found.options, "pilot_reason": found.reason, "repeat": repeat}
     return result
 
 
@@ -130,8 +143,8 @@ def _piloted(
     count: int,
     time_limit: float | None,
     callback: ProgressCallback | None,
-) -> tuple[Choices, dict[str, str]]:
-    """What a pilot makes of `choices`, and what the metadata say of it."""
+) -> tuple[Choices, Found, dict[str, Any]]:
+    """What a pilot makes of `choices`, what it found, and the options that were given beside it."""
     from clvol.measure.pilot import pilot
 
     started = time.perf_counter()
@@ -142,17 +155,13 @@ def _piloted(
 
     even = replace(choices, target_error=None)  # its trials give every pixel as many samples
     found = pilot(device, scene, even, seed=seed, spp=count, time_limit=time_limit, tell=tell)
-    given = {f: n for f, n in choices.names.items() if n != "auto" and f not in found.names}
-    options = " ".join([found.options, *(f"--{family} {name}" for family, name in given.items())])
-    if choices.majorant_scale != 1:
-        options += f" --majorant-scale {choices.majorant_scale:g}"
-    if choices.target_error is not None:
-        options += f" --target-error {choices.target_error:g}"
-    repeat = f"clvol render {scene.source or 'SCENE'} … {' '.join(options.split())} --seed {seed}"
     log.info("pilot: %s; %s", ", ".join(f"{k} {v}" for k, v in found.names.items()), found.reason)
-    log.info("pilot: repeat with %s", repeat)
-    about = {"pilot": found.options, "pilot_reason": found.reason, "repeat": repeat}
-    return replace(choices, **found.names), about
+    given = {f: n for f, n in choices.names.items() if n != "auto" and f not in found.names}
+    if choices.majorant_scale != 1:
+        given["majorant_scale"] = choices.majorant_scale
+    for name in ("step", "target_error", "aov"):
+        given[name] = getattr(choices, name)
+    return replace(choices, **found.names), found, given
 
 
 def _choice(scene: Scene, family: str, value: str) -> str:

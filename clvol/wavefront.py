@@ -153,11 +153,11 @@ class Wavefront:
 
         int (n,), or None for all; a list needs kernels with `config.pixel_list`.
         """
-        chosen = np.arange(self.pixels) if pixels is None else pixels
-        self.listed = len(chosen)
+        self.listed = self.pixels if pixels is None else len(pixels)
         self.sample_jobs = self.listed * self.config.jobs_per_sample  # of one sample of each
         self.pass_samples = max(1, self.pool.pass_jobs // self.sample_jobs)
         if self.config.pixel_list and self.buffers:
+            chosen = np.arange(self.pixels) if pixels is None else pixels
             entries = np.stack([chosen, self.film.samples[chosen]], axis=1).astype(np.uint32)
             self._write("pixel_list", entries)
 
