@@ -33,7 +33,7 @@ class NamesOfFamily(RegistryChoice):
     def convert(
         self, value: str | tuple[str, ...], param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[str, ...]:
-        """Known names, each once; OptionError with the known ones if one is not."""
+        """Known names; OptionError with the known ones if one is not."""
         from clvol.comparison.names import split_names
 
         return split_names(self.name, value)
@@ -70,7 +70,7 @@ def family_options(command: Any) -> Any:
     type=click.FloatRange(min=0, min_open=True),
     callback=finite,
     metavar="SECONDS",
-    help="Seconds that each combination renders for, over all rounds; 10 by default; with sampler "
+    help="About the seconds that each combination renders for, over all rounds; 10 by default; with sampler "
     "sobol the nearest that a power of two of samples allows. The reference takes about ten times as long as "
     "one of them.",
 )

@@ -32,11 +32,12 @@ class Names(RegistryChoice):
         return "NAME,…"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The names as a tuple; OptionError where one is unknown."""
+        """The names as a tuple; OptionError where there is none, or one is unknown."""
         if not isinstance(value, str):
             return value
-        names = [name.strip() for name in value.split(",")]
-        return tuple(super(Names, self).convert(name, param, ctx) for name in names)
+        from clvol.comparison.names import split_names
+
+        return split_names(self.name, value)
 
 
 def _other_families(command: Any) -> Any:
@@ -146,6 +147,7 @@ def _bar(quiet: bool) -> Iterator[Callable[[int, int, str], None] | None]:
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn()
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("loading", total=None)
         yield lambda done, total, what: bar.update(task, completed=done, total=total, description=what)

@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -164,7 +165,10 @@ def interrupted_render(signals=1):
     def press(progress):
         while left[0]:
             left[0] -= 1
-            signal.raise_signal(signal.SIGINT)  # to this thread, one after the other
+            handler = signal.getsignal(signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
+            while left[0] and signal.getsignal(signal.SIGINT) is handler:
+                time.sleep(0.001)  # Python may put it off where other threads run, and two would merge
 
     return rendered(scene(), spp=50 * SPP, seed=7, progress=press)
 

@@ -265,6 +265,9 @@ def test_a_ray_that_meets_no_medium_is_told_so_with_a_pixel_that_does():
         clvol.trace_ray(clvol.load_dict(SLAB | {"sensor": SLAB["sensor"] | {"fov": 90}}), 0, 0)
     with pytest.raises(OptionError, match="meets no medium before a surface stops it"):
         clvol.trace_ray(clvol.load_dict(SLAB | {"disk": DISK | {"bsdf": {"type": "diffuse"}}}), 4, 4)
+    empty = SLAB["box"] | {"interior": {"type": "homogeneous", "sigma_t": 0.0}}
+    with pytest.raises(OptionError, match="the scene has no density anywhere"):
+        clvol.trace_ray(clvol.load_dict(SLAB | {"box": empty}), 4, 4)
 
 
 def test_a_surface_that_light_passes_is_passed_straight():
@@ -279,6 +282,8 @@ def test_a_surface_that_light_passes_is_passed_straight():
     [
         (["9", "4"], ["pixel (9, 4) is outside the picture", "9 x 9", "x is 0 to 8"]),
         (["4", "4", "--techniques", "delta,spectrl"], ["unknown technique 'spectrl'", "spectral"]),
+        (["4", "4", "--techniques", ""], ["no technique is given"]),
+        (["4", "4", "--techniques", "auto:pilot"], ["auto:pilot is for clvol render only"]),
         (["4", "4", "--step", "0.1"], ["nothing marches"]),
         (["4", "4", "--transmittances", "none"], ["'none' estimates nothing"]),
         (["4", "4", "-o", "ray.gif"], ["unknown format '.gif'", ".svg"]),

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING
+
+from clvol.progress import format_seconds
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -14,32 +17,39 @@ class Bar:
 
     def __init__(self, console: Console | None = None) -> None:
         from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
         console = console or Console(stderr=True)
         self._bar = Progress(
             TextColumn("{task.description}", markup=False),
             BarColumn(),
             TimeElapsedColumn(),
-            TextColumn("passed,"),
-            TimeRemainingColumn(),
-            TextColumn("left"),
+            TextColumn("{task.fields[left]}"),
             console=console,
             disable=not console.is_terminal,
             transient=True,
         )
-        self._task = self._bar.add_task("opening the scene", total=None)
-        self._measuring = False
+        self._task = self._bar.add_task("opening the scene", total=None, left="")
+        self._began: float | None = None
 
     def __enter__(self) -> Bar:
         self._bar.start()
         return self
 
     def __call__(self, done: float, expected: float, text: str) -> None:
-        if expected and not self._measuring:  # the pace of opening says nothing about that of rendering
-            self._measuring = True
-            self._bar.reset(self._task)
-        self._bar.update(self._task, description=text, completed=done, total=expected or None)
+        left = ""
+        if expected:
+            if self._began is None:  # the pace of opening says nothing about that of rendering
+                self._began = time.monotonic()
+                self._bar.reset(self._task)
+            left = progress_words(done, expected, time.monotonic() - self._began)
+        self._bar.update(self._task, description=text, completed=done, total=expected or None, left=left)
 
     def __exit__(self, *_exception: object) -> None:
         self._bar.stop()
+
+
+def progress_words(done: float, expected: float, passed: float) -> str:
+    """Share done and time left, at the pace so far; at the expected one while nothing is done."""
+    left = passed * (expected - done) / done if done > 0 else expected
+    return f"passed, {100 * done / expected:.0f} % done, {format_seconds(max(left, 0.0))} left"

@@ -49,9 +49,9 @@ def compare(
     Parameters
     ----------
     scene : from `load_file` or `load_dict`.
-    time_limit : seconds that each combination renders for, over all its rounds; 10 by default, and with
-        sampler sobol the nearest that a power of two of samples allows.  The reference takes about ten times
-        as long as one combination, unless it is given; renders with fewer samples a third as long.
+    time_limit : about the seconds that each combination renders for, over all its rounds; 10 by default, and
+        with sampler sobol the nearest that a power of two of samples allows.  The reference takes about ten
+        times as long as one combination, unless it is given; renders with fewer samples a third as long.
     spp : samples per pixel of one round instead, for all alike.
     rounds : independent renders of each combination, at least 4.
     baseline : label of the combination that efficiencies are relative to; the first by default.
@@ -70,7 +70,8 @@ def compare(
 
     Raises
     ------
-    OptionError, SceneError, VolumeError, DeviceError : what won't do, and why.
+    OptionError, SceneError, VolumeError, DeviceError : what won't do, and why; a single combination without a
+        reference is nothing to compare.
     """
     if not isinstance(scene, Scene):
         raise OptionError(
@@ -81,11 +82,16 @@ def compare(
     if reference is not None and reference_spp is not None:
         raise OptionError("reference_spp is for a reference that is rendered, and one is given")
     given = None if reference is None else read_reference(reference, scene)
+    if given is None and all(len(names) == 1 for names in asked.values()):
+        raise _nothing_to_compare([])
     opened = open_device(device)
     with Bar() if progress is True else nullcontext(progress or _silent) as told:
         lineup = open_lineup(
             opened, scene, asked, step, lambda n, of: told(n, 0.0, f"kernels, {n + 1} of {of}")
         )
+        if given is None and len(lineup.trials) == 1:
+            same = [f"{said} comes to the same as {label}" for said, label in lineup.doubles if said != label]
+            raise _nothing_to_compare(same + [f"{said} is left out: {why}" for said, why in lineup.left_out])
         labels = list(lineup.trials)
         chosen = _baseline(labels, baseline)
         measured, truth, interrupted = measure(
@@ -94,6 +100,12 @@ def compare(
     figures = compute_figures(measured, truth, chosen)
     about = _about(scene, opened, plan, step, measured, truth)
     return Comparison(figures, chosen, truth, lineup.left_out, lineup.doubles, interrupted, about)
+
+
+def _nothing_to_compare(reasons: list[str]) -> OptionError:
+    """With a reference that is given even one combination is compared with something."""
+    what = "; ".join(["only one combination: nothing to compare", *reasons])
+    return OptionError(what, hint="name several, as --techniques delta,regular, or give a --reference")
 
 
 def _silent(done: float, expected: float, text: str) -> None:

@@ -120,8 +120,8 @@ class _Entrant:
                 break
             spp *= 2 if taken > _TRIAL_SECONDS / 4 else 4
             spp = spp if most is None else min(spp, most)
-        second = self.render(next(seeds), spp)
-        self.pace = min(r.stats["seconds"]["render"] for r in (first, second)) / spp
+        second, third = (self.render(next(seeds), spp) for _ in range(2))
+        self.pace = float(np.median([r.stats["seconds"]["render"] for r in (first, second, third)])) / spp
         difference = first.image.astype(np.float64) - second.image
         self.variance = float((difference**2).mean()) / 2 * spp
 
@@ -205,7 +205,8 @@ def _samples(wanted: float, lineup: Lineup) -> int:
     """Samples of a render, at least 1.  Where sampler sobol takes part, a power of two from 4 on for all:
     others cost it some of its gain."""
     if any(uses_sobol(trial) for trial in lineup.trials.values()):
-        return 2 ** max(2, round(math.log2(max(wanted, 1.0))))
+        below = 2 ** max(2, math.floor(math.log2(max(wanted, 1.0))))
+        return below if wanted < 1.5 * below else 2 * below
     return max(1, round(wanted))
 
 
@@ -264,4 +265,6 @@ class _Clock:
     def tick(self, label: str) -> None:
         """A render is done."""
         self.done += self.expected.get(label, 0.0)
-        self.told(self.done, self.total, "rendering by turns" if self.total else f"trial of {label}")
+        self.told(
+            self.done, self.total, "rendering by turns" if self.total else f"finding the pace of {label}"
+        )

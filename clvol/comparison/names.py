@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Mapping
 
 from clvol.errors import OptionError
-from clvol.registry import FAMILIES, check_choice
+from clvol.registry import FAMILIES, PILOT, check_choice
+
+log = logging.getLogger("clvol")
 
 
 def plural(family: str) -> str:
@@ -29,15 +32,24 @@ def names_asked(options: Mapping[str, str | Iterable[str]]) -> dict[str, tuple[s
         family = families[spelling]
         if family in asked:
             raise OptionError(f"{family} is given twice", hint=f"give {plural(family)} once, as a list")
-        asked[family] = split_names(family, value)
+        asked[family] = _each_once(family, split_names(family, value))
     return {family: asked.get(family, ("auto",)) for family in FAMILIES}
 
 
 def split_names(family: str, value: str | Iterable[str]) -> tuple[str, ...]:
-    """Names of one family, in the order given and each once."""
+    """Names of one family, in the order given; OptionError for none, and for one that won't do here."""
     parts = value.split(",") if isinstance(value, str) else list(value)
-    names = dict.fromkeys(str(part).strip() for part in parts)
-    names.pop("", None)
+    names = [name for part in parts if (name := str(part).strip())]
     if not names:
         raise OptionError(f"no {family} is given", hint="give a name, several with commas, or auto")
+    if PILOT in names:
+        raise OptionError(f"{PILOT} is for clvol render only", hint=f"name each {family} here, or auto")
     return tuple(check_choice(family, name) for name in names)
+
+
+def _each_once(family: str, names: tuple[str, ...]) -> tuple[str, ...]:
+    once = tuple(dict.fromkeys(names))
+    for name in once:
+        if names.count(name) > 1:
+            log.warning("%s %s is asked for more than once, and measured once", family, name)
+    return once

@@ -13,6 +13,7 @@ from clvol.image_io import MAGENTA, tone_map
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#7a5195", "#555555")
@@ -80,6 +81,8 @@ def _errors(axes: Axes, comparison: Comparison, name: str, cost: str) -> None:
     axes.set(xscale="log", yscale="log")
     if starts:
         _guide(axes, starts, power)
+    _plain_ticks(axes.xaxis)
+    _plain_ticks(axes.yaxis)
     axes.grid(True, which="minor", color="#f2f2f2", linewidth=0.5)
     axes.figure.legend(fontsize=8, loc="outside lower center", ncols=3)
 
@@ -95,8 +98,6 @@ def _guide(axes: Axes, starts: list[tuple[float, float, float]], power: float) -
 
 def _efficiencies(figure: Figure, comparison: Comparison) -> None:
     """Ratios with their intervals; filled where they are significant."""
-    from matplotlib.ticker import FuncFormatter, LogLocator
-
     panels = figure.subplots(1, len(COSTS), sharey=True)
     places = np.arange(len(comparison.figures))[::-1]
     for axes, (cost, word) in zip(panels, COSTS.items(), strict=True):
@@ -119,13 +120,33 @@ def _efficiencies(figure: Figure, comparison: Comparison) -> None:
         axes.set(xscale="log", xlabel=f"efficiency by {word}, relative to {comparison.baseline}")
         finite = [end for end in ends if 0 < end < math.inf]
         axes.set_xlim(min(finite) / 1.3, max(finite) * 1.3)
-        subs = (1.0, 2.0, 5.0) if max(finite) / min(finite) < 300 else (1.0,)
-        axes.xaxis.set_major_locator(LogLocator(subs=subs))
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
-        axes.xaxis.set_minor_formatter(FuncFormatter(lambda x, _: ""))
+        _plain_ticks(axes.xaxis)
         axes.grid(False, axis="y")
     panels[0].set_yticks(places, [f.label for f in comparison.figures])
     panels[0].set_ylim(-0.6, len(places) - 0.4)
+
+
+def _plain_ticks(axis: Axis) -> None:
+    """Plain numbers on a logarithmic axis whose range is set: at least two, and not too many."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+
+    low, high = axis.get_view_interval()
+    if high / low < 4:
+        axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+    else:
+        subs = (1, 2, 3, 5) if high / low < 20 else (1, 2, 5) if high / low < 300 else (1,)
+        axis.set_major_locator(LogLocator(subs=subs, numticks=10))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: plain_number(value)))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def plain_number(value: float) -> str:
+    """0.06 or 2000; powers of ten only where noughts would have to be counted."""
+    if not value > 0 or 1e-4 <= value < 1e5:
+        return f"{value:g}"
+    digits, power = f"{value:.3e}".split("e")
+    digits = digits.rstrip("0").rstrip(".")
+    return f"$10^{{{int(power)}}}$" if digits == "1" else f"{digits}·$10^{{{int(power)}}}$"
 
 
 def picture(image: np.ndarray) -> bytes:

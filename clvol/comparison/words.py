@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import io
 import math
+import os
+import shutil
+import sys
+import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from clvol.comparison.figures import COSTS, LEVEL, Comparison, Efficiency, Figures
+from clvol.comparison.figures import ALPHA, COSTS, LEVEL, Comparison, Efficiency, Figures
 from clvol.comparison.measure import uses_sobol
 from clvol.measure.efficiency import Interval
 
@@ -33,6 +37,7 @@ def times(interval: Interval) -> str:
 def sentences(comparison: Comparison) -> list[Sentence]:
     """Everything that a reader should know, the most important first."""
     found = [Sentence("finding", text) for cost in COSTS for text in _efficiency(comparison, cost)]
+    found += [Sentence("finding", text) for text in _what_significant_means(comparison)]
     for figures in comparison.figures:
         found += [Sentence("verdict", _verdict(figures)), Sentence("verdict", _slope(figures))]
         if math.isfinite(figures.render_slope.value):
@@ -53,10 +58,21 @@ def _efficiency(comparison: Comparison, cost: str) -> Iterator[str]:
             f"By {COSTS[cost]}, {label} is {times(e.ratio)} times as efficient as {base} "
             f"at {at} spp a render{_significance(e)}."
         )
-    if len(others) > 1 and any(math.isfinite(e.adjusted_p) for e in others.values()):
+
+
+def _what_significant_means(comparison: Comparison) -> Iterator[str]:
+    """Once, whatever the kinds of cost: each has the same number of tests."""
+    others = [f for f in comparison.figures if f.label != comparison.baseline]
+    known = [
+        COSTS[c]
+        for c in COSTS
+        if any(math.isfinite(f.efficiency[c].adjusted_p) for f in others if c in f.efficiency)
+    ]
+    if len(others) > 1 and known:
         yield (
-            f"Significant by {COSTS[cost]} means that the chance of calling any of these {len(others)} "
-            f"wrongly different from {base} is {LEVEL:.0%} (Holm's correction); intervals are 95 % each."
+            f"Significant means that the chance of calling any of these {len(others)} wrongly different from "
+            f"{comparison.baseline} is {100 * LEVEL:.0f} %, by {' and by '.join(known)} each (Holm's "
+            "correction); intervals are 95 % each."
         )
 
 
@@ -79,7 +95,13 @@ def _verdict(figures: Figures) -> str:
         )
         return f"{figures.label} differs from the reference, {blame}: {verdict.explanation}."
     label = ", labelled as biased," if figures.biased else ""
-    return f"{figures.label}{label} agrees with the reference: {verdict.explanation}."
+    found = verdict.explanation
+    if math.isfinite(verdict.smallest_bias):
+        found = (
+            f"no difference beyond noise (p = {verdict.p:.2g}, an alarm is below {ALPHA:g}); a bias of "
+            f"{verdict.smallest_bias:.2g} of the mean would have been seen"
+        )
+    return f"{figures.label}{label} agrees with the reference: {found}."
 
 
 def _slope(figures: Figures) -> str:
@@ -160,6 +182,15 @@ def _warnings(comparison: Comparison) -> Iterator[str]:
             yield f"{figures.label}: {note}."
 
 
+VERDICTS = {
+    (False, True): "no bias seen",
+    (False, False): "BIASED",
+    (True, True): "labelled biased, not seen here",
+    (True, False): "biased, as labelled",
+}
+"""In the summary, by what its label says and whether it agrees with the reference."""
+
+
 def table_rows(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
     """Headings and rows of the summary."""
     heads = [
@@ -169,11 +200,11 @@ def table_rows(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
         "seconds",
         "look-ups per sample",
         "efficiency by time",
-        "by look-ups",
+        "efficiency by look-ups",
         "slope over renders",
         "over samples",
         "largest error",
-        "agrees",
+        "verdict",
     ]
     rows = []
     for f in comparison.figures:
@@ -181,7 +212,6 @@ def table_rows(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
         per_sample = float(f.measured.lookups.mean()) / (pixels * f.measured.spp)
         ratios = [_cell(f, cost, comparison.baseline) for cost in COSTS]
         slopes = [f"{s.value:.2f}" if math.isfinite(s.value) else "–" for s in (f.slope, f.render_slope)]
-        agrees = ("yes" if f.verdict.agrees else "NO") + (" (biased)" if f.biased else "")
         rows.append(
             [
                 f.label,
@@ -192,7 +222,7 @@ def table_rows(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
                 *ratios,
                 *slopes,
                 f"{f.largest_error.difference:+.2g}",
-                agrees,
+                VERDICTS[f.biased, f.verdict.agrees],
             ]
         )
     return heads, rows
@@ -207,8 +237,11 @@ def _cell(figures: Figures, cost: str, baseline: str) -> str:
     return times(e.ratio).replace(" to ", "–") + (" *" if e.significant else "")
 
 
-def text_table(comparison: Comparison) -> str:
-    """The summary as plain text, as wide as it needs to be: nothing is cut or folded."""
+def text_table(comparison: Comparison, width: int | None = None) -> str:
+    """The summary as plain text: a table, or a paragraph each where that is wider than `width` characters.
+
+    None takes the terminal's width, and any where there is none.  Nothing is cut.
+    """
     from rich import box
     from rich.console import Console
     from rich.table import Table
@@ -222,6 +255,28 @@ def text_table(comparison: Comparison) -> str:
         table.add_row(*map(Text, row))
     console = Console(file=io.StringIO(), width=10_000, color_system=None)
     console.print(table)
-    note = f"* significantly different from {comparison.baseline}"
-    lines = [line.rstrip() for line in console.file.getvalue().splitlines()]
-    return "\n".join([*(line for line in lines if line), note])
+    lines = [line.rstrip() for line in console.file.getvalue().splitlines() if line.strip()]
+    width = _terminal_width() if width is None else width
+    if width and max(map(len, lines)) > width:
+        lines = [line for row in rows for line in _paragraph(heads, row, width)]
+    if any(e.significant for f in comparison.figures for e in f.efficiency.values()):
+        lines.append(f"* significantly different from {comparison.baseline}")
+    return "\n".join(lines)
+
+
+def _paragraph(heads: list[str], row: list[str], width: int) -> list[str]:
+    """A combination's name and, below it, its cells; a line breaks only between them where it can."""
+    cells = "; ".join(
+        f"{head}: {cell}".replace(" ", "\xa0") for head, cell in zip(heads[1:], row[1:], strict=True)
+    )
+    folded = textwrap.wrap(
+        cells, max(width, 20), initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False
+    )
+    return [row[0], *(line.replace("\xa0", " ") for line in folded)]
+
+
+def _terminal_width() -> int | None:
+    """Of the terminal that is written to, or what COLUMNS says; None for a file."""
+    if not (sys.stdout.isatty() or os.environ.get("COLUMNS", "").isdigit()):
+        return None
+    return shutil.get_terminal_size().columns

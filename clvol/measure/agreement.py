@@ -233,7 +233,7 @@ def _explanation(found: Agreement, image: _Tests, tiles: _Tests, alpha: float) -
     seen = f"a bias of {found.smallest_bias:.2g} of the mean would have been seen"
     of_all, of_one = _difference(image), _difference(tiles)
     if found.agrees:
-        return f"the means differ by {of_all} of the mean at most, which is noise; {seen}"
+        return f"the means differ by {of_all.lstrip('+-−')} of the mean at most, which is noise; {seen}"
     if found.mean_p < alpha:
         return f"the image means differ by {of_all} of the mean (p = {found.mean_p:.1g})"
     x, y = found.worst_tile

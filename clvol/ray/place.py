@@ -15,6 +15,7 @@ from clvol.material_facts import is_transmissive, passes_light
 from clvol.prepare import PreparedScene
 from clvol.ray.kernels import RayKernels
 from clvol.scene.materials import Null
+from clvol.scene.records import ConstVolume, Medium
 
 MOST_SURFACES = 64
 """Surfaces that a ray may pass before it meets a medium."""
@@ -92,7 +93,7 @@ def find_places(kernels: RayKernels, x: int, y: int) -> list[Place]:
             f"the ray through pixel ({x}, {y}) meets no medium before a surface stops it"
             if len(hits)
             else f"the ray through pixel ({x}, {y}) meets no medium",
-            hint=pixel_hint(prepared),
+            hint=pixel_hint(prepared, x, y),
         )
     return places
 
@@ -157,15 +158,28 @@ def _presence(prepared: PreparedScene, bits: np.ndarray) -> np.ndarray:
     return presence
 
 
-def pixel_hint(prepared: PreparedScene) -> str:
-    """A pixel whose ray goes through the middle of a medium, where one is in the picture."""
+def pixel_hint(prepared: PreparedScene, x: int, y: int) -> str:
+    """Another pixel than (x, y), towards the middle of a medium, where one is in the picture."""
+    if all(_is_empty(prepared, entry.medium) for entry in prepared.boundaries.entries):
+        return "the scene has no density anywhere"
     rays = _camera_rays(prepared)
     width, height = prepared.scene.film.window[2:]
-    for lower, upper in entry_bounds(prepared.scene, prepared.boundaries):
-        if not np.isfinite([lower, upper]).all():
+    bounds = entry_bounds(prepared.scene, prepared.boundaries)
+    for entry, (lower, upper) in zip(prepared.boundaries.entries, bounds, strict=True):
+        if _is_empty(prepared, entry.medium) or not np.isfinite([lower, upper]).all():
             continue
         towards = (lower + upper) / 2 - prepared.centre - rays.eye
         a, b, depth = np.linalg.solve(np.column_stack([rays.base_dx, rays.base_dy, rays.base]), towards)
-        if depth > 0 and 0 <= a / depth < width and 0 <= b / depth < height:
-            return f"try {int(a / depth)} {int(b / depth)}, towards the middle of a medium"
+        if not (depth > 0 and 0 <= a / depth < width and 0 <= b / depth < height):
+            continue
+        middle = int(a / depth), int(b / depth)
+        if middle != (x, y):
+            return f"try {middle[0]} {middle[1]}, towards the middle of a medium"
     return "choose a pixel where the picture shows a medium"
+
+
+def _is_empty(prepared: PreparedScene, medium: Medium) -> bool:
+    """Whether its density is 0 everywhere."""
+    volume = medium.sigma_t
+    largest = volume.value if isinstance(volume, ConstVolume) else prepared.volumes[id(volume)].bricks.maximum
+    return not np.any(largest) or not np.any(medium.scale)

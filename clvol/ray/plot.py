@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from clvol.ray.view import CHANNEL_NAMES
 from clvol.ray.walks import UNNAMED, Walk, Watched, format_estimate
 
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ BLUE, VERMILION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#9A9A9A"
 SERIES = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 STYLES = ("-", (0, (5, 1.5)), (0, (1.5, 1)), (0, (5, 1.5, 1.5, 1.5)))
 CHANNEL_COLOURS = (VERMILION, GREEN, BLUE)
-CHANNEL_NAMES = ("red", "green", "blue")
 DISTANCE = "distance from the camera (scene lengths)"
 BINS = 96
 HEADROOM = 1.3
@@ -42,9 +42,15 @@ def draw(view: RayView) -> Figure:
         first = _walks_panel(figure, panels[row], view, watched, first, row == rows - 1)
     _estimates(figure, right, view, first)
     figure.suptitle(_title(view), fontsize=15, fontweight="bold")
-    figure.legend(handles=_symbols(view), loc="outside lower center", ncols=5, frameon=False, fontsize=10)
-    if view.notes:
-        figure.text(0.995, 0.002, "  ".join(view.notes), ha="right", va="bottom", fontsize=8, color="#555555")
+    figure.legend(
+        handles=_symbols(view),
+        loc="outside lower center",
+        ncols=5,
+        frameon=False,
+        fontsize=10,
+        title="  ".join([*view.notes, *view.bound_notes]) or None,
+        title_fontsize=9,
+    )
     return figure
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from clvol import registry
 from clvol.choices import Choices
+from clvol.comparison.names import split_names
 from clvol.device import open_device
 from clvol.errors import OptionError
 from clvol.features import is_homogeneous
@@ -74,14 +75,13 @@ def trace_ray(
     unknown = set(choices) - known
     if unknown:
         raise OptionError(f"trace_ray has no choice {min(unknown)!r}")
+    techniques = split_names("technique", techniques) if techniques else techniques
+    transmittances = split_names("transmittance", transmittances) if transmittances else transmittances
     asked = {*(techniques or ()), *(transmittances or ())}
     if choices.get("step") is not None and "marching" not in asked:
         raise OptionError("step is for ray marching, and nothing marches here", hint="name marching too")
     if "none" in asked:
         raise OptionError("transmittance 'none' estimates nothing to show", hint="leave it out")
-    for family, values in (("technique", techniques), ("transmittance", transmittances)):
-        for value in values or ():
-            registry.check_choice(family, value)
     seed, opened = scene.seed if seed is None else seed, open_device(device)
     tell = progress or (lambda done, total, what: None)
     tell(0, 1, "the ray")
@@ -116,7 +116,7 @@ def _first_matter(base: RayKernels, x: int, y: int) -> tuple[Place, np.ndarray]:
     name = _name(base.prepared.boundaries.entries[places[0].medium].medium)
     raise OptionError(
         f"the ray through pixel ({x}, {y}) meets no density: {name} is empty along it",
-        hint=pixel_hint(base.prepared),
+        hint=pixel_hint(base.prepared, x, y),
     )
 
 
@@ -164,7 +164,11 @@ def _to_watch(
         shadows = []
     if not found + shadows:
         raise OptionError("nothing to show", hint="name at least one technique")
-    return list(dict.fromkeys(found + shadows)), notes
+    once = list(dict.fromkeys(found + shadows))
+    notes += [
+        f"{p[1]} is asked for more than once, and shown once." for p in once if (found + shadows).count(p) > 1
+    ]
+    return once, notes
 
 
 def _channel(sigma_t: np.ndarray, channel: int | None) -> int:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SUFFIXES = (".png", ".svg", ".pdf", ".json")
+CHANNEL_NAMES = ("red", "green", "blue")
 DARK = 1e-3
 """Transmittance beyond which there is little to see."""
 
@@ -80,6 +81,24 @@ class RayView:
     def transmittance(self) -> np.ndarray:
         """exp(-depth), float64 (channels, n + 1)."""
         return np.exp(-self.depth)
+
+    @property
+    def bound_notes(self) -> list[str]:
+        """A sentence where other channels rise above majorants, which are of the channel that is shown."""
+        others = np.delete(self.sigma_t, self.channel, axis=0)
+        middles, exceeded = (self.edges[1:] + self.edges[:-1]) / 2, []
+        for watched in self.watched:
+            if watched.rate() is None or watched.name == "residual-ratio" or not len(others):
+                continue
+            cells = watched.cells
+            place = np.minimum(np.searchsorted(cells[:, 1], middles), len(cells) - 1)
+            inside = (middles >= cells[0, 0]) & (middles <= cells[-1, 1])
+            if (inside & (others > 1.001 * watched.rate()[place])).any():
+                exceeded.append(watched.label)
+        if not exceeded:
+            return []
+        shown = CHANNEL_NAMES[self.channel]
+        return [f"Majorants of {', '.join(exceeded)} are bounds of the {shown} channel only."]
 
     def figure(self) -> Figure:
         """The view as a matplotlib figure."""
