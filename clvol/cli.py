@@ -173,8 +173,17 @@ def render(
         import clvol
 
         loaded = clvol.load_file(scene, **dict(definitions))
+        piloted = options["technique"] == "auto:pilot"
+        if piloted and not quiet and not console.is_terminal:
+            from clvol.measure.repeat import announcement
+
+            click.echo(announcement(loaded, options), err=True)
         with nullcontext(False) if quiet else RichProgress(console) as progress:
             result = clvol.render(loaded, spp=spp, time_limit=time_limit, progress=progress, **options)
+        if piloted:
+            from clvol.measure.repeat import with_definitions
+
+            result.metadata["repeat"] = with_definitions(result.metadata["repeat"], dict(definitions))
         failures = _save_all(result, outputs, exposure)
     interrupted = bool(result.stats.get("interrupted"))
     if interrupted:
@@ -238,7 +247,8 @@ def _summary(result: Result, outputs: tuple[str, ...]) -> Iterator[str]:
     else:
         yield f"  {', '.join(used)}; {lookups:.4g} look-ups per sample"
     if "pilot" in about:
-        yield f"  pilot: {about['pilot_reason']}; repeat with {about['repeat']}"
+        yield f"  pilot: {about['pilot_reason']}; repeat with"
+        yield f"  {about['repeat']}"
 
 
 @main.command()

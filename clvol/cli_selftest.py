@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from typing import TYPE_CHECKING
 
 import click
 
-from clvol.cli_options import Definition, finite
+from clvol.cli_options import INTERRUPTED, Definition, finite
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
     from clvol.measure.judgement import Tested
     from clvol.measure.selftests import SelfTest
@@ -23,7 +23,8 @@ Examples:
   clvol selftest scenes/smoke.xml --quick
   clvol selftest scenes/room.xml --time 600 --alpha 1e-6
 
-Exits with 0 where all agree, 1 where one disagrees or is faulty, 2 for a mistake.
+Exits with 0 where all agree, 1 where one disagrees or is faulty, 2 for a mistake, 130 for
+Ctrl-C.
 """
 
 
@@ -78,16 +79,26 @@ def selftest(
     from clvol.measure.selftests import selftest as run
 
     loaded = clvol.load_file(scene, **dict(definitions))
-    with _Steps(Console(stderr=True)) as steps:
-        found = run(
-            loaded, quick=quick, seconds=seconds, alpha=alpha, seed=seed, device=device, progress=steps.tell
-        )
+    context = click.get_current_context()
+    try:
+        with _Steps(Console(stderr=True)) as steps:
+            found = run(
+                loaded,
+                quick=quick,
+                seconds=seconds,
+                alpha=alpha,
+                seed=seed,
+                device=device,
+                progress=steps.tell,
+            )
+    except KeyboardInterrupt:
+        click.echo("clvol: interrupted before the second round: no verdict", err=True)
+        context.exit(INTERRUPTED)
     console = Console()
-    if not console.is_terminal:  # a file or a pipe has no width to keep to
-        console = Console(width=200)
-    console.print(table_of(found))
-    console.print(*notes(found), sep="\n", highlight=False, markup=False, soft_wrap=True)
-    click.get_current_context().exit(0 if found.passed else 1)
+    width = console.width if console.is_terminal else 0  # a file or a pipe has no width to keep to
+    lines = [*table_of(found, width), "", *(line for note in notes(found) for line in wrapped(note, width))]
+    click.echo("\n".join(lines))
+    context.exit(1 if not found.passed else INTERRUPTED if found.interrupted_of else 0)
 
 
 class _Steps:
@@ -114,20 +125,39 @@ class _Steps:
         self._bar.update(self._tasks[what], completed=done, total=total)
 
 
-def table_of(found: SelfTest) -> Table:
-    """A row for each combination."""
-    from rich.table import Table
+TOGETHER = "\N{NO-BREAK SPACE}"
+HEADINGS = ("#", "mean", "p", "sees a bias of", "verdict")
 
+
+def table_of(found: SelfTest, width: int = 0) -> list[str]:
+    """Lines of plain text: each combination's number and figures, below them where it differs.
+
+    width : columns of the terminal, at which options are wrapped; 0 for a file, whose lines have no end.
+    """
     families = [f for f in found.tested[0].names if len({t.names[f] for t in found.tested}) > 1]
-    table = Table(title_justify="left")
-    for family in families:
-        table.add_column(family)
-    for name in ("mean", "p", "sees a bias of"):
-        table.add_column(name, justify="right")
-    table.add_column("verdict")
-    for one in found.tested:
-        table.add_row(*(one.names[f] for f in families), *_figures(one, len(found.tested)), _word(one))
-    return table
+    rows = [
+        (str(n), *_figures(one, len(found.tested)), _word(one)) for n, one in enumerate(found.tested, start=1)
+    ]
+    widths = [max(map(len, column)) for column in zip(HEADINGS, *rows, strict=True)]
+    indent = " " * (widths[0] + 2)
+
+    def line(row: tuple[str, ...]) -> str:
+        figures = (text.rjust(size) for text, size in zip(row[:-1], widths, strict=False))
+        return "  ".join([*figures, row[-1]])
+
+    lines = [line(HEADINGS)]
+    for one, row in zip(found.tested, rows, strict=True):
+        used = [f for f in families if one.names[f] != "none" or f == "transmittance"]
+        names = ", ".join(f"{family}{TOGETHER}{one.names[family]}" for family in used)
+        lines += [line(row), *(wrapped(indent + names, width, indent) if names else ())]
+    return lines
+
+
+def wrapped(text: str, width: int, indent: str = "") -> list[str]:
+    """Lines of at most so many columns, broken between words; the text itself for a width of 0."""
+    whole = {"break_long_words": False, "break_on_hyphens": False}
+    lines = textwrap.wrap(text, width, subsequent_indent=indent, **whole) if width else [text]
+    return [line.replace(TOGETHER, " ") for line in lines]
 
 
 def _figures(one: Tested, count: int) -> tuple[str, str, str]:
@@ -149,11 +179,12 @@ def _word(one: Tested) -> str:
 def notes(found: SelfTest) -> list[str]:
     """How it was tested, and the verdict."""
     width, height = found.size
+    cut = f", interrupted before all {found.interrupted_of}" if found.interrupted_of else ""
     left_out = f"; left out as biased: {', '.join(found.left_out)}" if found.left_out else ""
     return [
-        f"{width} x {height} pixels, {found.rounds} rounds of {found.spp} samples each, "
-        f"{found.seconds:.0f} seconds; every choice occurs, and {found.pairs} of {found.all_pairs} pairs of "
-        f"choices{left_out}.",
+        f"{width} x {height} pixels, {found.rounds} rounds of {found.spp} spp each{cut}; "
+        f"{found.seconds:.1f} s of rendering, {found.kernel_seconds:.0f} s of building kernels; "
+        f"every choice occurs, and {found.pairs} of {found.all_pairs} pairs of choices{left_out}.",
         "p: of the greatest deviation from all others, of tiles and means, adjusted for everything tested; "
         f"an accusation of a sound scene has probability {found.alpha:g} at most.",
         *(

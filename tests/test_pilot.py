@@ -5,6 +5,7 @@ The search runs on made-up candidates, whose variances and seconds are planted; 
 
 import functools
 import logging
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,8 +19,9 @@ from clvol.cli import main
 from clvol.config import KernelConfig
 from clvol.errors import OptionError
 from clvol.measure import pilot as pilots
-from clvol.measure.candidates import Candidate
+from clvol.measure.candidates import Candidate, Relative
 from clvol.measure.combinations import independent_seeds, unbiased
+from clvol.measure.repeat import announcement, repeat_command, with_definitions
 from clvol.scene.records import ConstantEmitter, DirectionalEmitter
 
 CUBE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
@@ -202,6 +204,30 @@ def test_impossible_combinations_are_no_candidates():
     assert not any("regular" in c.label for c in run.candidates)
 
 
+def test_a_choice_that_may_be_no_better_is_not_taken():
+    """Better by more than 5 % on the mean, but the interval of its ratio contains 1; certain, it is taken."""
+    _, run = run_of_autos()
+    auto, best = run.candidates[:2]
+    for low, taken in ((0.95, False), (1.02, True)):
+        found = run._report(best, auto, Relative(1.12, low, 1.31))
+        assert (found.names == best.trial.names) is taken and ("stay" in found.reason) is not taken
+        assert f"1.12 ({low} to 1.31)" in found.reason
+    assert found.reason.count(" and ") == 1 and "majorants tried" in found.reason
+
+
+def test_the_line_that_repeats_a_render_is_a_whole_command():
+    lit = replace(scene(lumps(), (SKY,)), source="my scene.xml")
+    line = repeat_command(lit, "--majorant grid", {"step": None, "aov": ("null", "real"), "spp": 7})
+    line = with_definitions(line, {"name": "a b", "res": "32"})
+    given = dict.fromkeys(pilots.CHOSEN, "auto") | {"majorant": "grid"}
+    most = len(unbiased("technique")) + len(unbiased("transmittance")) - 1
+    assert f"up to {most} combinations" in announcement(lit, given)
+    assert line == (
+        "clvol render 'my scene.xml' -o OUT.exr --majorant grid --aov null --aov real --spp 7 "
+        "-D 'name=a b' -D res=32"
+    )
+
+
 # -- a render for real --------------------------------------------------------------------------------
 
 
@@ -223,7 +249,8 @@ def test_the_picture_is_that_of_the_choice_with_the_same_seed(caplog, monkeypatc
     about = found.metadata
     assert "--seed 9" in about["repeat"] and about["pilot"] in about["repeat"]
     assert "transmittance" in about["pilot_reason"] and "kernel builds" in about["pilot_reason"]
-    assert about["repeat"] in caplog.text
+    assert about["pilot_reason"] in caplog.text
+    assert about["repeat"].endswith(" --spp 4 --seed 9") and " -o OUT.exr " in about["repeat"]
     words = about["pilot"].split()
     assert words[0] == "--transmittance" and words[1] != "none"
     options = {name.removeprefix("--"): value for name, value in zip(words[::2], words[1::2], strict=True)}
@@ -238,7 +265,8 @@ def test_a_pilot_before_a_render_to_a_target_error():
     assert found.metadata["sampler"] == sampler and found.metadata["target_error"] == 0.1
     assert f"--sampler {sampler}" in found.metadata["repeat"] and found.noise < 0.15
     assert (
-        "of transmittance" in found.metadata["pilot_reason"] and "nan" not in found.metadata["pilot_reason"]
+        "transmittances tried" in found.metadata["pilot_reason"]
+        and "nan" not in found.metadata["pilot_reason"]
     )
 
 

@@ -3,6 +3,8 @@
 The judgement is tested on made-up pictures; the whole of it on a homogeneous cube, whose kernels are small.
 """
 
+import itertools
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -12,13 +14,15 @@ from scipy import stats
 import clvol
 from clvol import programs
 from clvol.cli import main
+from clvol.cli_selftest import notes, table_of
 from clvol.errors import OptionError
 from clvol.features import Features
-from clvol.measure import judgement
+from clvol.measure import judgement, selftests
 from clvol.measure.combinations import KEYS, covering, in_force, independent_seeds, unbiased, usable
 from clvol.measure.judgement import judge
 from clvol.measure.reduced import reduced
 from clvol.measure.selftests import SelfTest
+from clvol.measure.trials import rounds
 from clvol.registry import FAMILIES
 from clvol.scene.records import ConstantEmitter, DirectionalEmitter, Film
 
@@ -182,6 +186,22 @@ def test_a_noisy_combination_does_not_make_the_others_blind():
     assert seen[0] > 0.1 and max(seen[1:]) < 0.04
 
 
+def test_nothing_of_the_table_is_cut_on_a_narrow_terminal():
+    tested = made_up(np.random.default_rng(3), GRID)
+    judge(tested, 1e-4)
+    for one in tested:
+        one.names["majorant"] = "x" * 40 + one.names["technique"]
+    found = SelfTest(tested, 1e-4, (16, 16), 4, 4, 1, 1, [], 1.06, 74.2)
+    narrow, uncut = table_of(found, 80), table_of(found)
+    assert max(map(len, narrow)) <= 80 and len(uncut) == 1 + 2 * len(tested)
+    assert " ".join(narrow).split() == " ".join(uncut).split()
+    for n, (one, row, options) in enumerate(zip(tested, uncut[1::2], uncut[2::2], strict=True), start=1):
+        assert row.split()[0] == str(n) and row.endswith("agrees")
+        assert all(f"{f} {one.names[f]}" in options for f in ("technique", "transmittance"))
+        assert "sampler" not in options  # the same for all
+    assert "1.1 s of rendering, 74 s of building kernels" in notes(found)[0]
+
+
 @pytest.mark.parametrize(
     "totals, needs_bound, passed",
     [
@@ -245,6 +265,24 @@ def test_a_sound_scene_passes_and_a_planted_bias_does_not(tmp_path, monkeypatch)
     assert not found.passed
     accused = {one.names["lights"] for one in found.disagreeing}  # those who sample lights, or who find them
     assert len(accused) == 1 and not accused & {one.names["lights"] for one in found.tested if one.agrees}
+
+
+@pytest.mark.parametrize("complete", [1, 2])
+def test_an_interrupt_leaves_complete_rounds_to_be_judged(tmp_path, monkeypatch, complete):
+    def interrupted(*arguments):
+        yield from itertools.islice(rounds(*arguments), complete)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(selftests, "rounds", interrupted)
+    monkeypatch.setattr(selftests, "affordable", lambda *_: (4, 12))
+    found = run(tmp_path)
+    assert found.exit_code == 130
+    if complete == 1:
+        assert found.stderr.strip() == "clvol: interrupted before the second round: no verdict"
+        assert not found.stdout
+    else:
+        assert "2 rounds of 4 spp each, interrupted before all 12;" in found.stdout
+        assert "combinations agree" in found.stdout.splitlines()[-1]
 
 
 def test_mistakes_are_told_in_one_line(tmp_path):

@@ -49,7 +49,8 @@ FINAL_ROUNDS = 4
 SPENT = {"technique": 0.4, "transmittance": 0.8, "majorant": 1.0}
 """Share of its time that a pilot may have used after a family; it stops halving there."""
 WORTH = 1.05
-"""How much more efficient than auto's rules a choice must be found for it to be taken instead."""
+"""How much more efficient than auto's rules a choice must be found for it to be taken instead; the whole
+interval must be above 1 besides."""
 HOPELESS = 8.0
 """A candidate whose round takes so many times as long as auto's is dropped at once."""
 _LEAST_PATHS, _MOST_PIXELS, _SPP = 1 << 15, 2048, 8
@@ -125,12 +126,14 @@ class Pilot:
         self.kernel_seconds = self.seconds = 0.0
         self.whole: float | None = None  # rounds of the pilot that the picture is worth
         self.candidates: list[Candidate] = []
-        self.done = self.planned = 0
         self.open = [f for f in CHOSEN if getattr(choices, f) == "auto"]
+        self.done = 0
+        self.planned = sum(ROUNDS * 2 * len(unbiased(family)) for family in self.open) + 2 * FINAL_ROUNDS
         self.considered = {f: 0 for f in self.open}
 
     def found(self) -> Found:
         """Run the stages."""
+        self.tell(0, self.planned)
         film = self.scene.film.window
         self.small, self.spp = reduced(self.scene, _MOST_PIXELS), _SPP
         auto = best = self._open(self.choices)
@@ -138,7 +141,7 @@ class Pilot:
         for family in self.open:
             best = self._stage(family, best, auto)
         relative = self._confirmed(best, auto)
-        return self._report(best if relative.value >= WORTH else auto, auto, relative)
+        return self._report(best, auto, relative)
 
     def _confirmed(self, best: Candidate, auto: Candidate) -> Relative:
         """Efficiency of the choice over auto's, by rounds that did not choose it."""
@@ -176,7 +179,6 @@ class Pilot:
         auto.images.clear()
         expected = self.time_limit or each * pixels * self.samples
         self.budget = min(max(SHARE * expected, LEAST_SECONDS), MOST_SECONDS)
-        self.planned = sum(ROUNDS * 2 * len(unbiased(family)) for family in self.open) + 2 * FINAL_ROUNDS
         samples = self.budget / (max(self.planned, 1) * each * _TYPICAL)
         least = _LEAST_PATHS / auto.trial.session.config.jobs_per_sample
         self.spp = 2 ** max(1, round(math.log2(max(samples, least) / count)))
@@ -256,17 +258,21 @@ class Pilot:
         return f"{candidate.label} {relative_efficiency(candidate, auto)}"
 
     def _report(self, best: Candidate, auto: Candidate, relative: Relative) -> Found:
-        """The choice, with its reason."""
+        """The choice, with its reason: auto's rules, unless the best is better beyond chance."""
+        stays = best is auto or relative.value < WORTH or relative.low <= 1
+        other = f", with {best.label} {relative} times as efficient" if 0 < relative.value != 1 else ""
+        if stays:
+            best, relative = auto, Relative(1.0, 1.0, 1.0)
         config, names = best.trial.session.config, best.trial.session.choices()
         chosen = {f: getattr(config, f) for f in CHOSEN if getattr(config, f) in FAMILIES[f]}
-        numbers = ", ".join(f"{count} of {family}" for family, count in self.considered.items() if count > 1)
+        tried = [f"{count} {family}s" for family, count in self.considered.items() if count > 1]
+        numbers = " and ".join([", ".join(tried[:-1]), tried[-1]] if tried[1:] else tried)
         if not numbers:
             reason = "this scene leaves nothing to choose"
-        elif best is auto:
-            relative = Relative(1.0, 1.0, 1.0)
-            reason = f"auto's own rules are the best or within {WORTH - 1:.0%} of it, of {numbers}"
+        elif stays:
+            reason = f"auto's own rules stay: nothing is better beyond doubt{other}, of {numbers} tried"
         else:
-            reason = f"{relative} times as efficient as auto's {auto.label}, best of {numbers}"
+            reason = f"{relative} times as efficient as auto's {auto.label}, of {numbers} tried"
         if numbers:
             reason += f"; {self.seconds:.1f} s of rendering, {self.kernel_seconds:.1f} s of kernel builds"
         used = {f: n for f, n in chosen.items() if names[f] == n or (f == "transmittance" and config.nee)}

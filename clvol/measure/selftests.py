@@ -35,6 +35,8 @@ from clvol.result import Result
 from clvol.scene.records import Scene
 
 LEAST_ROUNDS, MOST_ROUNDS = 4, 32
+ENOUGH_ROUNDS = 2
+"""To be judged after a Ctrl-C: their differences are the noise."""
 _TRIAL_SPP = 4
 
 
@@ -63,7 +65,8 @@ class SelfTest:
     size, spp, rounds : film (width, height), samples per pixel of a round, rounds of each combination.
     pairs, all_pairs : pairs of choices that occur together in a combination, and that could.
     left_out : biased choices, which are not tested.
-    seconds : of everything.
+    seconds : of rendering.  kernel_seconds : of building kernels.
+    interrupted_of : rounds that there were to be, where Ctrl-C ended them early; else 0.
     judgement : of the choices, as contrasts of those that use one with those that don't.
     """
 
@@ -76,6 +79,8 @@ class SelfTest:
     all_pairs: int
     left_out: list[str]
     seconds: float
+    kernel_seconds: float = 0.0
+    interrupted_of: int = 0
     judgement: Judgement = field(default_factory=lambda: Judgement((), ()))
 
     @property
@@ -168,9 +173,14 @@ def selftest(
     spp : samples per pixel of each of `LEAST_ROUNDS` rounds, instead of what `seconds` allow.
     progress : called with what is done, the steps of it done, and how many there are.
 
+    Returns
+    -------
+    SelfTest.  Ctrl-C after two rounds or more ends them, and those that are complete are judged.
+
     Raises
     ------
     OptionError, SceneError, VolumeError, DeviceError : an alpha, scene, volume or device that won't do.
+    KeyboardInterrupt : Ctrl-C before two rounds were complete.
     """
     if not isinstance(scene, Scene):
         raise OptionError(f"selftest takes a Scene, not {type(scene).__name__}", hint="use load_file")
@@ -178,7 +188,6 @@ def selftest(
         raise OptionError(f"alpha {alpha} is no probability", hint="give a small one, such as 1e-4")
     if seconds is not None and not 0 < seconds < math.inf:
         raise OptionError(f"{seconds} is not a positive number of seconds")
-    started = time.perf_counter()
     effort = QUICK if quick else FULL
     tell = progress or (lambda what, done, total: None)
     small, opened = reduced(scene, effort.pixels), open_device(device)
@@ -186,16 +195,29 @@ def selftest(
     trials = [Trial.open(opened, small, Choices())]
     with quiet_renders():
         pairs, all_pairs = open_covering(trials, opened, small, effort, tell)
+        started = time.perf_counter()
         seeds, count = independent_seeds(seed, "selftest"), LEAST_ROUNDS
         if spp is None:
             spp, count = affordable(trials, seconds or effort.seconds, seeds)
         tested = _rendered(trials, spp, count, seeds, tell)
+    elapsed, building = time.perf_counter() - started, sum(t.session.kernel_seconds for t in trials)
     for one in tested:
         one.found = brightest_light(small) / spp if one.names[LIGHTS] == "found" else 0.0
-    judgement = judge(tested, alpha)
-    size = small.film.window[2:]
-    elapsed = time.perf_counter() - started
-    return SelfTest(tested, alpha, size, spp, count, pairs, all_pairs, biased(), elapsed, judgement)
+    judgement, size, had = judge(tested, alpha), small.film.window[2:], len(tested[0].images)
+    return SelfTest(
+        tested,
+        alpha,
+        size,
+        spp,
+        had,
+        pairs,
+        all_pairs,
+        biased(),
+        elapsed,
+        building,
+        count if had < count else 0,
+        judgement,
+    )
 
 
 def brightest_light(scene: Scene) -> float:
@@ -233,12 +255,17 @@ def affordable(trials: list[Trial], seconds: float, seeds: Iterator[int]) -> tup
 
 
 def _rendered(trials: list[Trial], spp: int, count: int, seeds: Iterator[int], tell: Step) -> list[Tested]:
+    """The combinations with `count` rounds each, or those complete at a Ctrl-C, of which two are enough."""
     tested = [Tested(options_of(t), names_in_force(t.session), t.session.needs_bound()) for t in trials]
     rendered: list[list[Result]] = []
     tell("rounds", 0, count)
-    for results in itertools.islice(rounds(trials, [spp] * len(trials), seeds), count):
-        rendered.append(results)
-        tell("rounds", len(rendered), count)
+    try:
+        for results in itertools.islice(rounds(trials, [spp] * len(trials), seeds), count):
+            rendered.append(results)
+            tell("rounds", len(rendered), count)
+    except KeyboardInterrupt:
+        if len(rendered) < ENOUGH_ROUNDS:
+            raise
     for one, results in zip(tested, zip(*rendered, strict=True), strict=True):
         one.images = np.stack([r.image for r in results])
         one.totals = {
