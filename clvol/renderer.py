@@ -201,12 +201,15 @@ def _sample_range(
 
 @contextmanager
 def _interrupt_flag() -> Iterator[Callable[[], bool]]:
-    """Turns the first Ctrl-C into a flag; the second one is an ordinary KeyboardInterrupt."""
+    """Turns the first Ctrl-C into a flag; the second one is an ordinary KeyboardInterrupt.
+
+    A process that ignores Ctrl-C, as the background jobs of a shell script do, goes on ignoring it.
+    """
     flag = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
+    previous = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or previous in (signal.SIG_IGN, None):
         yield flag.is_set
         return
-    previous = signal.getsignal(signal.SIGINT)
 
     def on_interrupt(number: int, frame: object) -> None:
         flag.set()

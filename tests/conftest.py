@@ -1,6 +1,7 @@
 """Fixtures every test may use: the device under test, and where the real volumes are."""
 
 import os
+import signal
 from pathlib import Path
 
 import pytest
@@ -36,6 +37,14 @@ def independent_samples():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(choices, "DEFAULT_SAMPLER", "independent")
         yield
+
+
+@pytest.fixture
+def ctrl_c():
+    """Ctrl-C as in a terminal: background jobs of a script, where these tests may run, ignore it."""
+    previous = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, previous)
 
 
 @pytest.fixture(scope="session")

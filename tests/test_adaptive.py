@@ -369,6 +369,7 @@ def test_a_time_limit_leaves_a_whole_picture(half, monkeypatch, ticks):
     assert result.image[:, :4] == pytest.approx(1.0)
 
 
+@pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize("presses", [1, 4])
 def test_ctrl_c_keeps_what_there_is_of_every_pixel(presses):
     """At the first report, which is the pilot's, and at a later one."""

@@ -216,6 +216,7 @@ def test_interrupted_render_saves_what_it_has_and_says_so(
     assert (tmp_path / "a.exr").exists()
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_ends_a_real_render_and_keeps_the_picture(
     scene: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

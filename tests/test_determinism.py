@@ -173,6 +173,7 @@ def interrupted_render(signals=1):
     return rendered(scene(), spp=50 * SPP, seed=7, progress=press)
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_keeps_whole_passes_of_every_pixel():
     """What is left has the bits of a shorter render: no pixel has more samples, no path was dropped."""
     cut = interrupted_render()
@@ -182,10 +183,17 @@ def test_ctrl_c_keeps_whole_passes_of_every_pixel():
     assert digest(cut) == digest(rendered(scene(), spp=cut.samples[1], seed=7))
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_a_second_ctrl_c_is_a_keyboard_interrupt():
     with pytest.raises(KeyboardInterrupt):
         interrupted_render(signals=2)
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_process_that_ignores_ctrl_c_goes_on_ignoring_it(ctrl_c):
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    whole = rendered(scene(), spp=SPP, seed=7, progress=lambda _: signal.raise_signal(signal.SIGINT))
+    assert whole.samples == (0, SPP) and not whole.stats["interrupted"]
 
 
 def test_a_time_limit_keeps_whole_passes_too():

@@ -5,6 +5,7 @@ Pictures and the ray are made by the very commands that README prints; tables by
 
 from __future__ import annotations
 
+import math
 import platform
 import re
 import shlex
@@ -41,7 +42,8 @@ each in {rounds} rounds, with independent samples; errors are those against a re
 independent seeds, whose own variance is subtracted. Efficiency is 1 / (MSE × seconds),
 precomputation counted and kernel builds not, and 1 / (MSE × look-ups), as multiples of the first
 row's, with 95 % intervals; **bold** where the difference is significant (Holm). The slope is that
-of a render's MSE over its samples: -1 for independent samples without bias. "Bias seen" is the
+of a render's MSE over its samples: -1 for independent samples without bias (no slope where renders
+are too short to be cut). "Bias seen" is the
 smallest relative bias of the image mean that the test against the reference would have noticed; its
 verdict has a false alarm once in 10,000.
 """
@@ -103,7 +105,7 @@ def row(figures: Figures) -> str:
     name = f"`{figures.label}`" + (" *biased*" if figures.biased else "")
     return (
         f"| {name} | {efficiency[0]} | {efficiency[1]} | {lookups:.3g} "
-        f"| {slope.value:.2f} ({slope.low:.2f} to {slope.high:.2f}) "
+        f"| {'–' if math.isnan(slope.value) else f'{slope.value:.2f} ({slope.low:.2f} to {slope.high:.2f})'} "
         f"| {100 * verdict.smallest_bias:.2g} % | {'yes' if verdict.agrees else 'NO'} |"
     )
 
