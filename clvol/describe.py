@@ -151,9 +151,9 @@ def _shape(shape: records.Shape) -> str:
     if shape.emission:
         parts.append(f"radiance {_spectrum(shape.emission)}")
     if shape.exterior:
-        parts.append(f"before it {_medium(shape.exterior)}")
+        parts.append(f"exterior: {_medium(shape.exterior)}")
     if shape.interior:
-        parts.append(_medium(shape.interior))
+        parts.append(f"interior: {_medium(shape.interior)}")
     return ", ".join(parts if len(parts) > 1 else [*parts, "empty"])
 
 
