@@ -102,7 +102,7 @@ def resolve(features: Features, asked: Mapping[str, str]) -> dict[str, str]:
     """Every family's choice but the majorant's, which `prepare` weighs by its cost; `auto` follows the rules
     that README states."""
     rules = {
-        "technique": "delta",  # of chromatic media too, a path for each channel: docs/techniques.md
+        "technique": _technique(features, asked),
         "transmittance": _transmittance(features),
         "lookup": "exact",
         "absorption": "mixed",
@@ -111,6 +111,15 @@ def resolve(features: Features, asked: Mapping[str, str]) -> dict[str, str]:
         "sampler": DEFAULT_SAMPLER,
     }
     return {family: asked[family] if asked[family] != "auto" else rule for family, rule in rules.items()}
+
+
+def _technique(features: Features, asked: Mapping[str, str]) -> str:
+    """Chromatic media, too, take delta, a path for each channel.  Where collisions are light rather than
+    scattering, exact flights are worth their look-ups: one low-discrepancy number places the whole flight
+    (docs/techniques.md)."""
+    glows = features.dark_emission and not features.media_overlap and not features.chromatic_extinction
+    sobol = asked["sampler"] == "sobol" or (asked["sampler"] == "auto" and DEFAULT_SAMPLER == "sobol")
+    return "regular" if glows and sobol and asked["lookup"] != "stochastic" else "delta"
 
 
 def _transmittance(features: Features) -> str:

@@ -61,6 +61,7 @@ class Features:
     emission: bool = False
     emission_volumes: bool = False
     temperature: bool = False
+    dark_emission: bool = False
     trilinear: bool = False
     nearest: bool = False
     coloured_volumes: bool = False
@@ -140,6 +141,8 @@ class Features:
             emission=bool(emissive),
             emission_volumes=any(isinstance(m.emission, records.GridVolume) for m in emissive),
             temperature=any(isinstance(m.temperature, records.GridVolume) for m in emissive),
+            dark_emission=not all(homogeneous)
+            and all(_glows_in_the_dark(m) for m in media if not is_homogeneous(m)),
             trilinear=any(v.filter_type == "trilinear" for v in volumes),
             nearest=any(v.filter_type == "nearest" for v in volumes),
             coloured_volumes=any(channels_of(v) > 1 for v in volumes),
@@ -279,6 +282,12 @@ def bounding_kind(shape: records.Shape) -> str:
 def _scatters(medium: records.Medium) -> bool:
     albedo = medium.albedo.value if isinstance(medium.albedo, records.ConstVolume) else (1.0,)
     return bool((np.array(albedo) * np.array(medium.scale) > 0).any())
+
+
+def _glows_in_the_dark(medium: records.Medium) -> bool:
+    """Emits, and absorbs at least as much as it scatters, everywhere."""
+    dark = isinstance(medium.albedo, records.ConstVolume) and max(medium.albedo.value) <= 0.5
+    return medium.emits and dark
 
 
 def _emitter_is_grey(emitter: records.Emitter) -> bool:

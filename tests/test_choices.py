@@ -1,6 +1,7 @@
 """What `auto` takes, what is refused and why, and that nothing chosen is ignored in silence."""
 
 import logging
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from clvol import registry, render
 from clvol.choices import Choices, resolve
 from clvol.errors import OptionError
 from clvol.features import Features
-from clvol.scene.records import ConstantEmitter, DirectionalEmitter
+from clvol.scene.records import ConstantEmitter, ConstVolume, DirectionalEmitter
 
 CUBE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 LUMPS = np.random.default_rng(1).random((5, 6, 7))
@@ -43,6 +44,33 @@ def test_auto_follows_the_rules_that_are_written_down(described, technique, tran
     assert (found["technique"], found["transmittance"]) == (technique, transmittance)
     others = {name: found[name] for name in ("lookup", "absorption", "probability", "control")}
     assert others == {"lookup": "exact", "absorption": "mixed", "probability": "history", "control": "mean"}
+
+
+def glowing(albedo=0.5, scale=(3.0,), more=()):
+    medium = gridded(volume(LUMPS, *CUBE), albedo, scale=scale)
+    medium = replace(medium, emission=ConstVolume((1.0,)))
+    return picture([box(*CUBE, medium), *more], [SKY], (0.4, 0.5, -3.0), (0.5, 0.5, 0.5), 30.0, (4, 4))
+
+
+@pytest.mark.parametrize(
+    "described, asked, technique",
+    [
+        (glowing(), {}, "regular"),
+        (glowing(), {"sampler": "independent"}, "delta"),
+        (glowing(), {"lookup": "stochastic"}, "delta"),
+        (glowing(), {"technique": "delta"}, "delta"),
+        (glowing(albedo=(0.5, 0.5, 0.6)), {}, "delta"),
+        (glowing(scale=(3.0, 2.0, 1.0)), {}, "delta"),
+        (glowing(more=[box((2, 0, 0), (3, 1, 1), homogeneous(1.0, 0.9))]), {}, "regular"),
+        (glowing(more=[box((0.5, 0, 0), (1.5, 1, 1), homogeneous(1.0, 0.5))]), {}, "delta"),
+        (scene(), {}, "delta"),
+    ],
+)
+def test_auto_takes_exact_flights_where_low_discrepancy_samples_meet_dark_media_that_glow(
+    described, asked, technique
+):
+    found = resolve(Features.from_scene(described), AUTO | {"sampler": "sobol"} | asked)
+    assert found["technique"] == technique
 
 
 @pytest.mark.parametrize(
