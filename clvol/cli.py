@@ -13,11 +13,16 @@ import click
 from clvol.cli_compare import compare
 from clvol.cli_options import (
     INTERRUPTED,
-    Definition,
     OneLineErrors,
     RenderCommand,
     choice_options,
+    definitions_option,
+    device_option,
     finite,
+    majorant_scale_option,
+    positive_option,
+    quiet_option,
+    step_option,
 )
 from clvol.cli_ray import ray
 from clvol.cli_selftest import selftest
@@ -54,16 +59,6 @@ Examples:
 """
 
 
-definitions_option = click.option(
-    "-D",
-    "definitions",
-    type=Definition(),
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Fill $NAME in the scene.",
-)
-
-
 @click.group(
     "clvol",
     cls=OneLineErrors,
@@ -91,21 +86,8 @@ def main(ctx: click.Context) -> None:
     help="Picture to write, .exr or .png; may be given several times.",
 )
 @choice_options
-@click.option(
-    "--majorant-scale",
-    type=click.FloatRange(min=0, min_open=True),
-    default=1.0,
-    callback=finite,
-    metavar="FACTOR",
-    help="Multiply every bound of the density, for experiments.",
-)
-@click.option(
-    "--step",
-    type=click.FloatRange(min=0, min_open=True),
-    callback=finite,
-    metavar="LENGTH",
-    help="Step of ray marching; the edge of a voxel by default.",
-)
+@majorant_scale_option
+@step_option
 @click.option(
     "--aov",
     multiple=True,
@@ -113,24 +95,20 @@ def main(ctx: click.Context) -> None:
     help="Add a picture to the .exr, of those below; may be given several times.",
 )
 @click.option("--spp", type=click.IntRange(min=1), help="Samples per pixel; the scene's own by default.")
-@click.option(
+@positive_option(
     "--time",
     "time_limit",
-    type=click.FloatRange(min=0, min_open=True),
-    callback=finite,
     metavar="SECONDS",
     help="Render for so long instead.",
 )
-@click.option(
+@positive_option(
     "--target-error",
-    type=click.FloatRange(min=0, min_open=True),
-    callback=finite,
     metavar="NOISE",
     help="Render until the mean relative standard error is below NOISE, as 0.01, with samples where "
     "noise is; --spp or --time then say how long at most.",
 )
 @click.option("--seed", type=click.IntRange(min=0), help="Same seed, same bits; the scene's own by default.")
-@click.option("--device", metavar="PATTERN", help="Part of the device's name; see clvol devices.")
+@device_option
 @definitions_option
 @click.option(
     "--exposure",
@@ -141,7 +119,7 @@ def main(ctx: click.Context) -> None:
     help="Brighten a .png by so many stops.",
 )
 @click.option("-v", "--verbose", is_flag=True, help="Print features, built units, memory and time by stage.")
-@click.option("--quiet", is_flag=True, help="No progress bar and no summary.")
+@quiet_option
 def render(
     scene: str,
     outputs: tuple[str, ...],

@@ -7,7 +7,15 @@ from typing import Any
 
 import click
 
-from clvol.cli_options import INTERRUPTED, Definition, ExplainedCommand, RegistryChoice, finite
+from clvol.cli_options import (
+    INTERRUPTED,
+    ExplainedCommand,
+    RegistryChoice,
+    definitions_option,
+    device_option,
+    positive_option,
+    quiet_option,
+)
 
 EXAMPLES = """
 \b
@@ -64,11 +72,9 @@ def family_options(command: Any) -> Any:
 @click.argument("scene", metavar="SCENE")
 @click.option("-o", "--output", metavar="FOLDER", required=True, help="Report to write, or to replace.")
 @family_options
-@click.option(
+@positive_option(
     "--time",
     "time_limit",
-    type=click.FloatRange(min=0, min_open=True),
-    callback=finite,
     metavar="SECONDS",
     help="About the seconds that each combination renders for, over all rounds; 10 by default; with sampler "
     "sobol the nearest that a power of two of samples allows. The reference takes about ten times as long as "
@@ -89,24 +95,15 @@ def family_options(command: Any) -> Any:
 @click.option("--baseline", metavar="LABEL", help="What efficiencies are relative to; the first by default.")
 @click.option("--reference", metavar="FILE.exr", help="Compare with this; rendered if none is given.")
 @click.option("--reference-spp", type=click.IntRange(min=1), help="Samples per pixel of the reference.")
-@click.option(
+@positive_option(
     "--step",
-    type=click.FloatRange(min=0, min_open=True),
-    callback=finite,
     metavar="LENGTH",
     help="Step of the combinations that march; the edge of a voxel by default.",
 )
 @click.option("--seed", type=click.IntRange(min=0), help="Of the first render; the scene's own by default.")
-@click.option("--device", metavar="PATTERN", help="Part of the device's name; see clvol devices.")
-@click.option(
-    "-D",
-    "definitions",
-    type=Definition(),
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Fill $NAME in the scene.",
-)
-@click.option("--quiet", is_flag=True, help="No progress bar and no summary.")
+@device_option
+@definitions_option
+@quiet_option
 def compare(
     scene: str, output: str, definitions: tuple[tuple[str, str], ...], quiet: bool, **options: Any
 ) -> None:

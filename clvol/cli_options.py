@@ -112,6 +112,35 @@ def finite(ctx: click.Context, param: click.Parameter, value: float | None) -> f
     return value
 
 
+def positive_option(*names: str, **settings: Any) -> Any:
+    """An option that takes a finite number above 0."""
+    above_zero = click.FloatRange(min=0, min_open=True)
+    return click.option(*names, type=above_zero, callback=finite, **settings)
+
+
+definitions_option = click.option(
+    "-D",
+    "definitions",
+    type=Definition(),
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Fill $NAME in the scene.",
+)
+device_option = click.option(
+    "--device", metavar="PATTERN", help="Part of the device's name; see clvol devices."
+)
+quiet_option = click.option("--quiet", is_flag=True, help="No progress bar and no summary.")
+majorant_scale_option = positive_option(
+    "--majorant-scale",
+    default=1.0,
+    metavar="FACTOR",
+    help="Multiply every bound of the density, for experiments.",
+)
+step_option = positive_option(
+    "--step", metavar="LENGTH", help="Step of ray marching; the edge of a voxel by default."
+)
+
+
 def choice_options(command: Any) -> Any:
     """An option for every family of the registry that takes a name of it; "auto" by default."""
     from clvol.registry import FAMILIES, FAMILY_PURPOSE

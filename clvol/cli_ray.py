@@ -8,7 +8,15 @@ from typing import Any
 
 import click
 
-from clvol.cli_options import Definition, ExplainedCommand, RegistryChoice, finite
+from clvol.cli_options import (
+    ExplainedCommand,
+    RegistryChoice,
+    definitions_option,
+    device_option,
+    majorant_scale_option,
+    quiet_option,
+    step_option,
+)
 
 EXAMPLES = """
 \b
@@ -77,34 +85,14 @@ def _other_families(command: Any) -> Any:
     help="How transmittance is estimated; ratio,residual-ratio by default.",
 )
 @_other_families
-@click.option(
-    "--majorant-scale",
-    type=click.FloatRange(min=0, min_open=True),
-    default=1.0,
-    callback=finite,
-    metavar="FACTOR",
-    help="Multiply every bound of the density, for experiments.",
-)
-@click.option(
-    "--step",
-    type=click.FloatRange(min=0, min_open=True),
-    callback=finite,
-    metavar="LENGTH",
-    help="Step of ray marching; the edge of a voxel by default.",
-)
+@majorant_scale_option
+@step_option
 @click.option("--channel", type=click.Choice(CHANNELS), help="The most attenuated by default.")
 @click.option("--walks", type=click.IntRange(1, 100), default=6, help="Walks shown one by one; 6 by default.")
 @click.option("--seed", type=click.IntRange(min=0), help="Same seed, same walks; the scene's own by default.")
-@click.option("--device", metavar="PATTERN", help="Part of the device's name; see clvol devices.")
-@click.option(
-    "-D",
-    "definitions",
-    type=Definition(),
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Fill $NAME in the scene.",
-)
-@click.option("--quiet", is_flag=True, help="No progress bar and no summary.")
+@device_option
+@definitions_option
+@quiet_option
 def ray(
     scene: str,
     x: int,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from clvol.cli_options import INTERRUPTED, Definition, finite
+from clvol.cli_options import INTERRUPTED, definitions_option, device_option, positive_option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -31,11 +31,9 @@ Ctrl-C.
 @click.command(epilog=EXAMPLES)
 @click.argument("scene", metavar="SCENE")
 @click.option("--quick", is_flag=True, help="Fewer combinations on a smaller film: about a minute.")
-@click.option(
+@positive_option(
     "--time",
     "seconds",
-    type=click.FloatRange(min=0, min_open=True),
-    callback=finite,
     metavar="SECONDS",
     help="Render for so long, the building of kernels apart; 120 by default, 20 with --quick.",
 )
@@ -49,15 +47,8 @@ Ctrl-C.
 @click.option(
     "--seed", type=click.IntRange(0, 2**64 - 1), default=0, show_default=True, help="Same seed, same samples."
 )
-@click.option("--device", metavar="PATTERN", help="Part of the device's name; see clvol devices.")
-@click.option(
-    "-D",
-    "definitions",
-    type=Definition(),
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Fill $NAME in the scene.",
-)
+@device_option
+@definitions_option
 def selftest(
     scene: str,
     quick: bool,
