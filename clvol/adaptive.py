@@ -288,7 +288,7 @@ class TargetRender:
             counts.mean(),
             self.pilot.samples[0],
         )
-        if not noise <= 1.05 * self.target:
+        if not noise <= 1.05 * self.target:  # the pilot's foresight
             log.warning("the noise is %.3g, the target was %.3g", noise, self.target)
 
 

@@ -1,4 +1,7 @@
-"""The `clvol` command: render, info, devices.  Heavy modules are imported where they are used."""
+"""The `clvol` command, with render, info and devices; other commands have files of their own.
+
+Heavy modules are imported where they are used.
+"""
 
 from __future__ import annotations
 

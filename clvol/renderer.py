@@ -131,6 +131,7 @@ def render(
         # a time limit is repeated by the samples it was enough for
         extent = {"spp": first + done} if target_error is None else {"spp": spp, "time": time_limit}
         repeat = repeat_command(scene, found.options, given | extent | {"seed": seed, "device": device})
+        log.info("repeat with: %s", repeat)
         result.metadata |= {"pilot": found.options, "pilot_reason": found.reason, "repeat": repeat}
     return result
 

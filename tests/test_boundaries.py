@@ -19,6 +19,7 @@ from surface_scenes import (
     GLASS,
     SKY,
     crossings,
+    found,
     icosphere,
     mesh_box,
     meshed,
@@ -289,7 +290,29 @@ def _flawed(kind):
     return sphere
 
 
-@pytest.mark.parametrize("kind", ["open", "inconsistent", "inside out", "turned by flip_normals"])
+FLAWS = ["open", "inconsistent", "inside out", "turned by flip_normals"]
+
+
+@pytest.mark.parametrize("kind", FLAWS)
+def test_a_flawed_mesh_neither_makes_light_nor_loses_it_nor_keeps_a_path(kind):
+    """Where nothing absorbs, every path reaches the white sky in the end, with all of its weight; but for
+    those that meet the black ball inside, which no light passes."""
+    shape = meshed(_flawed(kind), homogeneous(2.0, 1.0), flip_normals=kind == "turned by flip_normals")
+    wide = {"fov": 60.0, "size": (12, 12)}
+    alone = render(found([shape], **wide), spp=256, seed=1, transmittance="none", majorant="grid")
+    lit = show([shape], spp=256, **wide)
+    assert alone.image == pytest.approx(1.0, abs=1e-6)
+    mean, variance = image_mean(lit)  # shadow rays pass boundaries by the same rules
+    assert (np.abs(mean - 1) < largest_z(3) * np.sqrt(variance)).all() and (variance < 0.001**2).all()
+    for result in alone, lit:
+        assert result.stats["walks_exhausted"] == result.stats["non_finite"] == 0
+    clear = replace(shape, interior=homogeneous(0.5, 0.0))
+    solid = surfaced(ball((0.0, 0.0, 0.0), 0.4), BLACK)
+    result = show([clear, solid], spp=64, fov=6.0, size=(6, 6))
+    assert (result.image == 0).all()
+
+
+@pytest.mark.parametrize("kind", FLAWS)
 def test_a_flawed_mesh_is_named_and_spoils_only_its_own_surroundings(kind, caplog):
     medium = homogeneous(2.0, 0.99)
     shape = meshed(_flawed(kind), medium, name="the leaky one", flip_normals=kind == "turned by flip_normals")

@@ -162,6 +162,25 @@ def test_counts_of_a_render_add_up():
     assert stats["largest_sample"] >= result.image.max()
 
 
+def test_pictures_of_variance_and_efficiency_are_those_of_the_estimate():
+    """Variance is that of a sample; 1 / (efficiency · variance of the pixel) adds up to the stages' seconds,
+    and is a pixel's share of them: even where stages have no media to walk, by work where they have."""
+    result = render(chromatic_scene((0.9,)), spp=8, aov=("variance", "efficiency", "cells"))
+    of_pixels = result.variance.mean(axis=-1)
+    np.testing.assert_allclose(result.aovs["variance"], 8 * of_pixels, rtol=1e-5)
+    known = of_pixels > 0
+    assert known.mean() > 0.5
+    assert (result.aovs["efficiency"][~known] == 0).all()
+    spent = 1 / (result.aovs["efficiency"][known].astype(float) * of_pixels[known])
+    parts = result.stats["seconds"]
+    stages = {name: parts[name] for name in parts if name not in ("setup", "kernels", "render")}
+    walking = stages["medium_sample"] + stages["shadow_transmittance"]
+    work = (result.aovs["lookups"] + result.aovs["cells"]).astype(float)
+    share = work / work.sum()
+    expected = walking * share + (sum(stages.values()) - walking) / share.size
+    np.testing.assert_allclose(spent, expected[known], rtol=1e-4)
+
+
 def test_counts_are_the_same_whether_a_picture_shows_them_or_not():
     scene = chromatic_scene((0.9,))
     shown = render(scene, spp=8, technique="spectral", aov=("violations", "cells", "tentative", "real"))

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from OpenImageIO import ImageInput
 from pictures import ball, box, gridded, hg, homogeneous, picture, volume
 from stat_tests import assert_same_picture
 
@@ -118,6 +119,16 @@ def test_one_and_two_threads_give_the_same_bits(whole):
         assert done.returncode == 0, done.stderr
         digests.add(done.stdout.strip().splitlines()[-1].split("|")[0])
     assert digests == {digest(whole)}
+
+
+def test_sobol_is_what_users_get(tmp_path):
+    """In a process of its own: the tests' default is another (conftest.py)."""
+    scene, saved = Path(__file__).resolve().parent.parent / "scenes" / "slab.xml", tmp_path / "a.exr"
+    options = ["-o", str(saved), "--spp", "1", "-D", "res=8"]
+    command = [sys.executable, "-m", "clvol.cli", "render", str(scene), *options]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert ImageInput.open(str(saved)).spec().get_string_attribute("sampler") == "sobol"
 
 
 @pytest.mark.parametrize("cut", [SPP // 2, 337, 1])

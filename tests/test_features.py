@@ -313,9 +313,8 @@ SURFACE_CODE = (
     "stages/side",
 )
 MEDIUM_CODE = (
-    "tracking/d",
-    "tracking/h",
-    "tracking/p",
+    "tracking/",
+    "medium/",
     "density/",
     "majorant/",
     "phase/",
@@ -340,9 +339,11 @@ def test_scenes_without_surfaces_hold_no_geometry_code(device, name):
     ]
 
 
-def test_scenes_without_media_hold_no_tracking_code(device):
-    config = config_of(device, scene([PLAIN], [SKY, LAMP]))
-    assert not held(config, MEDIUM_CODE) and "medium_sample" not in config.stages
+@pytest.mark.parametrize("lights", [[SKY], [LAMP], [SKY, LAMP], []], ids=["sky", "lamp", "both", "dark"])
+def test_scenes_without_media_hold_no_tracking_code(device, lights):
+    config = config_of(device, scene([PLAIN], lights))
+    assert held(config, MEDIUM_CODE) <= {"tracking/tally.h"}  # counters, all of them without a field
+    assert "medium_sample" not in config.stages
     assert not argument_names(config) & {"media", "phases", "volumes", "bricks", "majorants"}
     assert not field_names(config) & {
         "medium",

@@ -249,7 +249,7 @@ def test_the_picture_is_that_of_the_choice_with_the_same_seed(caplog, monkeypatc
     about = found.metadata
     assert "--seed 9" in about["repeat"] and about["pilot"] in about["repeat"]
     assert "transmittance" in about["pilot_reason"] and "kernel builds" in about["pilot_reason"]
-    assert about["pilot_reason"] in caplog.text
+    assert about["pilot_reason"] in caplog.text and about["repeat"] in caplog.text
     assert about["repeat"].endswith(" --spp 4 --seed 9") and " -o OUT.exr " in about["repeat"]
     words = about["pilot"].split()
     assert words[0] == "--transmittance" and words[1] != "none"
