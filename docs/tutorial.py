@@ -37,13 +37,16 @@ result
 
 # %% [markdown]
 # ## Three techniques
-# `noise` is the mean relative standard error of the picture, `stats` what it cost. Twice the samples halve
-# the variance and take twice as long, so that 1 / (variance · seconds) does not depend on how many there
-# are: that is the efficiency. Times change with the machine, look-ups of the density do not; both are worth
-# a look.
+# `noise` is the mean relative standard error of the picture, `stats` what it cost. Twice as many independent
+# samples halve the variance and take twice as long, so that 1 / (variance · seconds) does not depend on how
+# many there are: that is the efficiency. (The default, `sampler="sobol"`, gains with their number; there,
+# compare renders of as many samples as you will use.) Times change with the machine, look-ups of the density
+# do not; both are worth a look.
 
 # %%
-results = {name: clvol.render(scene, technique=name, spp=SPP, seed=1) for name in TECHNIQUES}
+results = {
+    name: clvol.render(scene, technique=name, sampler="independent", spp=SPP, seed=1) for name in TECHNIQUES
+}
 
 
 def efficiency(result, cost):

@@ -14,7 +14,6 @@ from click.testing import CliRunner
 from scipy import stats
 
 import clvol
-from clvol.choices import Choices
 from clvol.cli import main
 from clvol.comparison.bar import progress_words
 from clvol.comparison.combine import Lineup, open_lineup
@@ -28,8 +27,7 @@ from clvol.comparison.shorter import render_slope, shorter_spp
 from clvol.comparison.words import _slope, text_table
 from clvol.errors import OptionError
 from clvol.image_io import split_channels, write_exr
-from clvol.measure.efficiency import Interval, Work, compare_efficiency, error_products
-from clvol.measure.trials import Trial
+from clvol.measure.efficiency import Interval
 from clvol.registry import FAMILIES
 from clvol.sobol import RANDOMIZATIONS
 
@@ -186,28 +184,6 @@ def test_seeds_leave_out_those_of_a_given_reference() -> None:
 
 
 # ---- what is claimed
-
-
-def test_a_technique_does_not_differ_significantly_from_itself(device, scene_file: Path) -> None:
-    """Forty comparisons of real renders, cost by look-ups: at most so many are called different as a rate
-    of 5 % allows, with a false alarm once in 10,000."""
-    trial = Trial.open(device, clvol.load_file(str(scene_file)), Choices(technique="delta"))
-    repeats, rounds, spp = 40, 4, 2
-    reference = Reference.of_rounds(np.stack([trial.render(n, 400).image for n in range(4)]), 400, "test")
-    results = [trial.render(10 + n, spp) for n in range(2 * repeats * rounds)]
-    works = []
-    for start in range(0, len(results), rounds):
-        images = np.stack([r.image for r in results[start : start + rounds]])
-        cost = np.array([float(r.stats["lookups"]) for r in results[start : start + rounds]])
-        products = error_products(images, reference.image, reference.variance)
-        works.append(Work(products, cost, reference_error=reference.product_error))
-    found = [compare_efficiency(*pair) for pair in zip(works[::2], works[1::2], strict=True)]
-    different = sum(f.p < 0.05 for f in found)
-    assert different <= stats.binom.isf(FALSE_ALARM, repeats, 0.05)
-    assert all((f.p < 0.05) == (not f.ratio.low <= 1 <= f.ratio.high) for f in found)
-    halved = [Work(w.products / 2, w.cost) for w in works]  # and a difference that is there is found
-    planted = [compare_efficiency(*pair) for pair in zip(halved[::2], works[1::2], strict=True)]
-    assert sum(f.p < 0.05 for f in planted) > repeats / 2
 
 
 def test_twice_the_samples_a_second_are_twice_the_efficiency_in_words_too() -> None:

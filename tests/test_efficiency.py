@@ -207,3 +207,20 @@ def test_holm_steps_down_and_leaves_the_unknown_out() -> None:
     np.testing.assert_allclose(found, [0.06, 0.03, np.nan, 0.06])
     assert holm(np.array([0.5, 0.9])).tolist() == [1.0, 1.0]
     assert holm(np.array([])).size == 0
+
+
+def test_a_family_of_equals_holds_a_significant_one_no_more_often_than_stated() -> None:
+    """Three against one baseline, of 5 rounds each: adjusted p-values keep the rate of all three together,
+    single ones do not."""
+    random, comparisons, level = np.random.default_rng(11), 1000, 0.05
+    adjusted = single = 0
+    for _ in range(comparisons):
+        shared = np.exp(0.3 * random.standard_normal(5))
+        base, *others = (
+            work(draw("chi2", random, 5), shared * np.exp(0.05 * random.standard_normal(5))) for _ in range(4)
+        )
+        p = np.array([compare_efficiency(other, base).p for other in others])
+        adjusted += (holm(p) < level).any()
+        single += (p < level).any()
+    most = stats.binom.isf(FALSE_ALARM, comparisons, level)
+    assert 0 < adjusted <= most < single

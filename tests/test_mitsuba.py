@@ -32,7 +32,8 @@ GALLERY = dict.fromkeys(("smoke in a room", "shafts of light", "jade"), 0.02)
 ROUNDING = 2e-6
 """Of the picture's mean: what is equal but for rounding of floats has no variance to excuse it."""
 
-PICTURES = {  # scene (of tests/mitsuba/, if no path), its defaults, samples per pixel of each of Mitsuba's renders and of ours
+# Scene (of tests/mitsuba/, if no path), its defaults, samples per pixel of a render of Mitsuba's and of ours.
+PICTURES = {
     "room": ("room", {}, 96, 2048),
     "glass": ("glass", {}, 32, 1024),
     "meshes": ("meshes", {}, 32, 4096),

@@ -8,13 +8,18 @@ import re
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
+from typing import Any
 
 import click
 import numpy as np
 import pytest
+import test_pilot
+from click.testing import CliRunner
 
 import clvol
+from clvol.choices import Choices
+from clvol.measure.candidates import Candidate, Relative
 from clvol.scene.mesh import mesh_flaws
 from clvol.scene.records import GridVolume, Mesh
 
@@ -122,11 +127,14 @@ def test_spread_is_median_least_and_greatest(tool) -> None:
     assert tool("efficiency").spread([3.0, 1.0, 9.0]) == {"median": 3.0, "least": 1.0, "greatest": 9.0}
 
 
-def test_targets_are_met_on_the_right_side(tool) -> None:
-    against = tool("bench_tables").against
-    assert against(2.9, 3.0).endswith("met") and against(3.1, 3.0).endswith("MISSED")
-    assert against(8.1, 8.0, at_least=True).endswith("met")
-    assert against(7.9, 8.0, at_least=True).endswith("MISSED")
+def test_aims_are_met_on_the_right_side_by_every_value(tool) -> None:
+    tables = tool("bench_tables")
+    assert (
+        tables.at_most("", "", 3.0, " s", 2.9, 3.0).met and not tables.at_most("", "", 3.0, "", 2.9, 3.1).met
+    )
+    assert tables.at_least("", "", 8.0, 8.1, 8.0).met and not tables.at_least("", "", 8.0, 8.1, 7.9).met
+    lines = tables.markdown([tables.at_most("a", "4 s", 3.0, " s", 4.0), tables.Row("b", "2 times")])
+    assert lines[2:] == ["| a | 4 s | at most 3 s: **missed** |", "| b | 2 times | – |"]
 
 
 # --- bench: grids ----------------------------------------------------------------------------------
@@ -170,10 +178,48 @@ def test_a_missing_embree_is_installed_or_told(
     assert rays.embree_environment()["PYTHONPATH"].startswith(str(tmp_path / "clvol" / "embreex"))
 
 
-@pytest.mark.parametrize(("z", "status"), [(1.0, 0), (-5.0, 1)])
-def test_pictures_that_differ_are_the_exit_status(tool, z: float, status: int) -> None:
-    finish = tool("bench").finish
-    assert finish((None, {"cloud": {"z": 0.0}, "room": {"z": z}})) == status
+def planted(z: float = 0.0, ratio: float = 20.0, agree: float = 1.0) -> dict[str, Any]:
+    """Figures of a comparison with Mitsuba and of one with Embree, as tools/bench.py keeps them."""
+    side = {"spp": 64, "mean": 0.5, "standard_error": 0.01, "version": "3.9.1"}
+    ratios = {"median": ratio, "least": ratio, "greatest": ratio}
+    cloud = {"scene": "cloud.xml", "res": 128, "clvol": side, "mitsuba": side, "ratio": ratios, "z": z}
+    rate = {"ratio": dict.fromkeys(ratios, 1.0), "agree": agree}
+    build = {"triangles": 1000, "seconds": 1.0, "peak": 6.0, "mesh": 1.0}
+    rates = {"1000 incoherent": {**rate, "agree": 1.0}, "1000 coherent": rate}
+    return {"cloud": cloud, "rays": {"rates": rates, "build": build}}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({}, ""),
+        ({"z": -5.0}, "5.0 standard errors apart"),
+        ({"ratio": 7.9}, "7.9 (7.9 to 7.9) times"),
+        ({"agree": 0.9989}, "0.998900"),
+    ],
+)
+def test_a_missed_aim_is_told_and_the_exit_status(
+    tool, capsys: pytest.CaptureFixture[str], wrong: dict[str, float], told: str
+) -> None:
+    assert tool("bench").finish((None, planted(**wrong))) == (1 if wrong else 0)
+    missed = capsys.readouterr().err.splitlines()
+    assert len(missed) == len(wrong) and all(line.startswith("MISSED") and told in line for line in missed)
+
+
+def test_what_cannot_be_measured_is_left_out_and_told(tool, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench, kept = tool("bench"), planted()["rays"]
+
+    def unavailable(*_: object) -> None:
+        raise tool("bench_tables").Unavailable("no Mitsuba here", "give one")
+
+    monkeypatch.setattr(bench, "mitsuba_here", unavailable)
+    monkeypatch.setattr(bench.rays, "callback", lambda **_: (None, {"rays": kept}))
+    for command in (bench.startup, bench.load, bench.memory, bench.chromatic.main, bench.pool):
+        monkeypatch.setattr(command, "callback", lambda **_: (None, {}))
+    outcome = CliRunner().invoke(bench.main, ["all"])
+    assert outcome.exit_code == 1 and "at least 0.999" in outcome.output
+    assert outcome.output.startswith("cloud: no Mitsuba here; give one\n")
+    assert "LEFT OUT: cloud: no Mitsuba here\nLEFT OUT: room: no Mitsuba here" in outcome.output
 
 
 def test_ray_meshes_are_closed_and_of_the_size_asked_for(tool) -> None:
@@ -181,6 +227,100 @@ def test_ray_meshes_are_closed_and_of_the_size_asked_for(tool) -> None:
     assert abs(len(faces) - 3000) < 200
     a, b, c = vertices[faces].swapaxes(0, 1)
     assert np.linalg.norm(np.cross(b - a, c - a), axis=1).min() > 0
+
+
+# --- docs ------------------------------------------------------------------------------------------
+
+
+def test_performance_replaces_what_is_between_the_markers(
+    tool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    docs, readme = tool("docs"), tmp_path / "README.md"
+    figures = planted() | {"left_out": {"room": "no Mitsuba here"}}
+    monkeypatch.setattr(docs.bench.everything, "callback", lambda **_: (None, figures))
+    readme.write_text(f"before\n{docs.FIRST}\n| room | 15 times | of last year |\n{docs.LAST}\nafter\n")
+    outcome = CliRunner().invoke(docs.main, ["performance", "--output", str(readme)])
+    assert outcome.exit_code == 1 and "LEFT OUT: room: no Mitsuba here" in outcome.output
+    text = readme.read_text()
+    assert text.startswith(f"before\n{docs.FIRST}\n") and text.endswith(f"\n{docs.LAST}\nafter\n")
+    assert "last year" not in text and "Not measured: `room`, no Mitsuba here." in text
+    assert "| 20 (20 to 20) times" in text and "| at least 8 |" in text
+    assert list(tmp_path.iterdir()) == [readme]
+
+
+@pytest.mark.parametrize("text", ["no markers", "{last} {first}", "{first} {last} {first} {last}"])
+def test_a_file_without_its_markers_is_refused_before_measuring(
+    tool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str
+) -> None:
+    docs, readme = tool("docs"), tmp_path / "README.md"
+    monkeypatch.setattr(docs.bench.everything, "callback", lambda **_: pytest.fail("measured"))
+    readme.write_text(text.format(first=docs.FIRST, last=docs.LAST))
+    outcome = CliRunner().invoke(docs.main, ["performance", "--output", str(readme)])
+    assert outcome.exit_code == 2 and outcome.output.count("\n") == 1 and docs.FIRST in outcome.output
+
+
+def test_all_runs_every_part_in_order_and_hands_mitsuba_on(tool, monkeypatch: pytest.MonkeyPatch) -> None:
+    docs, done = tool("docs"), []
+    monkeypatch.setattr(docs, "enclosed", lambda path: ("", ""))
+    monkeypatch.setattr(docs.bench.bench_cloud, "has_mitsuba", lambda python: True)
+    for part in (docs.pictures, docs.techniques, docs.pilot, docs.performance):
+        status = 1 if part is docs.pilot else None
+        note = lambda *_, part=part, status=status, **options: done.append((part.name, options)) or status  # noqa: E731
+        monkeypatch.setattr(part, "callback", note)
+    outcome = CliRunner().invoke(docs.main, ["all", "--mitsuba", "their/python"])
+    assert outcome.exit_code == 1, outcome.output
+    assert [name for name, _ in done] == ["pictures", "techniques", "pilot", "performance"]
+    assert done[-1][1]["mitsuba"] == "their/python" and done[-1][1]["output"].name == "README.md"
+
+
+# --- pilot -----------------------------------------------------------------------------------------
+
+
+def outcome_of_pilot(tool, to_best: Relative):
+    """A pilot that was tested, with this ratio to the best."""
+    found = SimpleNamespace(names={"technique": "delta"}, seconds=1.0, kernel_seconds=2.0)
+    best = Candidate("regular", None)
+    return tool("pilot").Tested("cloud", found, [best], [], 0, best, to_best, Relative(1.0, 1.0, 1.0))
+
+
+@pytest.mark.parametrize(("high", "word", "status"), [(0.8, "yes", 0), (0.79, "**NO**", 1)])
+def test_a_choice_too_far_from_the_best_is_told_and_the_exit_status(
+    tool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, high: float, word: str, status: int
+) -> None:
+    pilot, docs = tool("pilot"), tool("docs")
+    outcome = outcome_of_pilot(tool, Relative(0.7, 0.6, high))
+    monkeypatch.setattr(pilot, "tested", lambda *_: outcome)
+    monkeypatch.setattr(docs, "tested", lambda *_: outcome)
+    printed = CliRunner().invoke(pilot.main, ["--scene", "cloud"])
+    page = tmp_path / "pilot.md"
+    written = CliRunner().invoke(docs.main, ["pilot", "--scene", "cloud", "--output", str(page)])
+    assert printed.exit_code == written.exit_code == status, written.output
+    for text in (printed.output, page.read_text()):
+        assert f"| 0.70 (0.60 to {high:.2f}) | {word} |" in text
+
+
+def test_a_joint_optimum_that_the_search_missed_is_found(tool) -> None:
+    """One combination of those drawn is planted ten times as efficient as what its choices promise."""
+    pilot = tool("pilot")
+    found, run = test_pilot.made_up(Choices())
+    met = list(run.candidates)
+    added = pilot.unmet(run, 5)
+    labels = [candidate.label for candidate in run.candidates]
+    assert len(added) == 5 and len(set(labels)) == len(labels) == len(met) + 5
+    _, again = test_pilot.made_up(Choices())
+    assert [c.label for c in pilot.unmet(again, 5)] == [c.label for c in added]
+    chosen = next(c for c in met if pilot.is_of(c, found.names))
+    missed = next(c for c in added if len(c.images) > 1)
+    missed.seconds = [chosen.seconds[-1] / 10] * len(missed.seconds)
+    all_measured = [c for c in (*met, *added) if len(c.images) > 1]
+    for candidate in all_measured:
+        for seed in range(8):
+            candidate.seconds.append(candidate.seconds[-1])
+            candidate.images.append(
+                np.random.default_rng([seed, labels.index(candidate.label)]).normal(1.0, 0.1, (16, 16, 3))
+            )
+    best, to_best, _ = pilot.compared(all_measured, chosen)
+    assert best is missed and to_best.high < pilot.ENOUGH
 
 
 # --- make_scenes -----------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import click
 import numpy as np
-from bench_tables import thread_count
+from bench_tables import Figures, Row, ranged, thread_count
 from efficiency import Rounds, efficiency_ratio, image_mean, pixel_variance, z_score
 
 from clvol.choices import Choices, prepare_for
@@ -25,6 +25,7 @@ from clvol.session import Session
 
 CLOUD = Path(__file__).resolve().parent.parent / "scenes" / "cloud.xml"
 SIGMA_T, ALBEDO = (60.0, 30.0, 10.0), (0.95, 0.9, 0.8)
+BARS = ("sample", "mixed")
 FIREFLY = 30.0
 """A sample above so many times the largest pixel is one: a sky of radiance 1 lights nothing above 1."""
 
@@ -47,19 +48,13 @@ def timed(device, scene: Scene, choices: Choices, spp: int, seed: int):
     return session.result(0, done), cpu
 
 
-@click.command()
-@click.option("--res", default=64, show_default=True)
-@click.option("--spp", default=128, show_default=True)
-@click.option("--rounds", default=6, show_default=True, type=click.IntRange(min=2))
-@click.option("--technique", default="auto", show_default=True, help="The chromatic side's.")
-@click.option("--device", metavar="PATTERN", help="Part of the device's name; see clvol devices.")
-def main(res: int, spp: int, rounds: int, technique: str, device: str | None) -> None:
-    """Compare a chromatic render with three grey ones, in efficiency: 1 / (variance x CPU time)."""
+def measure_chromatic(res: int, spp: int, rounds: int, technique: str, device: str | None) -> Figures:
+    """Render by turns; both sides' cost, their means and the ratios of efficiency; the brightest sample."""
     opened = open_device(device)
     chosen = Choices(technique=technique)
     whole = cloud(SIGMA_T, ALBEDO, res)
     greys = [cloud((s,), (a,), res) for s, a in zip(SIGMA_T, ALBEDO, strict=True)]
-    bars = {name: Choices(technique="delta", absorption=name) for name in ("sample", "mixed")}
+    bars = {name: Choices(technique="delta", absorption=name) for name in BARS}
     for scene, choices in ((whole, chosen), *((grey, bar) for bar in bars.values() for grey in greys)):
         timed(opened, scene, choices, 4, 0)
     sides: dict[str, tuple[list, list]] = {name: ([], []) for name in ("chromatic", *bars)}
@@ -72,32 +67,81 @@ def main(res: int, spp: int, rounds: int, technique: str, device: str | None) ->
             sides[name][0].append(np.stack([r.image[..., 0] for r, _ in parts], axis=-1))
             sides[name][1].append(sum(cpu for _, cpu in parts))
     found = {name: Rounds(np.stack(images), np.array(cpu), spp) for name, (images, cpu) in sides.items()}
+    channels = [[part(found[name], channel) for name in ("chromatic", "mixed")] for channel in range(3)]
+    white, _ = timed(opened, cloud(SIGMA_T, (0.999,) * 3, res), chosen, 8 * spp, 1)
+    return {
+        "res": res,
+        "rounds": rounds,
+        "choices": {family: result.metadata[family] for family in ("technique", "absorption")},
+        "sides": {
+            name: {
+                "variance": float(pixel_variance(side).mean()),
+                "microseconds": float(1e6 * np.median(side.cpu) / side.paths),
+            }
+            for name, side in found.items()
+        },
+        "means": [[image_mean(side) for side in pair] for pair in channels],
+        "ratios": {name: efficiency_ratio(found["chromatic"], found[name]) for name in bars},
+        "white": {"samples": 8 * spp, "brightest": float(white.image.max())}
+        | {name: float(white.stats[name]) for name in ("largest_sample", "largest_weight")},
+    }
+
+
+def part(side: Rounds, channel: int) -> Rounds:
+    """One channel of a side."""
+    return replace(side, images=side.images[..., channel : channel + 1])
+
+
+def show_chromatic(figures: Figures) -> None:
+    """Both sides and their means, and whether there are fireflies."""
+    res, rounds, choices = (figures[name] for name in ("res", "rounds", "choices"))
     print(f"sigma_t {SIGMA_T}, albedo {ALBEDO}, {res} x {res}, {rounds} rounds, {thread_count()} threads")
-    print(f"chromatic: technique {result.metadata['technique']}, absorption {result.metadata['absorption']}")
-    for name, side in found.items():
+    print(f"chromatic: technique {choices['technique']}, absorption {choices['absorption']}")
+    for name, side in figures["sides"].items():
         what = "one chromatic render" if name == "chromatic" else f"three grey ones, absorption {name}"
-        print(
-            f"{what}: variance per sample {pixel_variance(side).mean():.5f}, "
-            f"CPU us per sample {1e6 * np.median(side.cpu) / side.paths:.3f}"
-        )
-    for channel in range(3):
-        part = np.s_[..., channel : channel + 1]
-        one = [replace(found[name], images=found[name].images[part]) for name in ("chromatic", "mixed")]
-        means = [image_mean(side) for side in one]
-        print(f"channel {channel}: means {means[0][0]:.6f}, {means[1][0]:.6f}, z {z_score(*means):+.2f}")
-    for name in bars:
-        ratio = efficiency_ratio(found["chromatic"], found[name])
+        costs = f"variance per sample {side['variance']:.5f}, CPU us per sample {side['microseconds']:.3f}"
+        print(f"{what}: {costs}")
+    for channel, (ours, grey) in enumerate(figures["means"]):
+        print(f"channel {channel}: means {ours[0]:.6f}, {grey[0]:.6f}, z {z_score(ours, grey):+.2f}")
+    for name, ratio in figures["ratios"].items():
         print(
             f"efficiency, chromatic over three grey renders with absorption {name}: {ratio['median']:.2f} "
             f"(95 % interval {ratio['low']:.2f} to {ratio['high']:.2f})"
         )
-    white = cloud(SIGMA_T, (0.999,) * 3, res)
-    result, _ = timed(opened, white, chosen, 1000, 1)
+    white = figures["white"]
     print(
-        f"albedo 0.999, 1000 samples: brightest pixel {result.image.max():.3f}, largest sample "
-        f"{result.stats['largest_sample']:.3f}, largest weight {result.stats['largest_weight']:.3f}: "
-        + ("FIREFLIES" if result.stats["largest_sample"] > FIREFLY * result.image.max() else "no firefly")
+        f"albedo 0.999, {white['samples']} samples: brightest pixel {white['brightest']:.3f}, largest sample "
+        f"{white['largest_sample']:.3f}, largest weight {white['largest_weight']:.3f}: "
+        + ("FIREFLIES" if white["largest_sample"] > FIREFLY * white["brightest"] else "no firefly")
     )
+
+
+def chromatic_rows(figures: Figures) -> list[Row]:
+    """What one chromatic render is worth."""
+    technique = figures["choices"]["technique"]
+    how = f"`{technique}`" + (", a path for each channel" if technique == "delta" else "")
+    sample, mixed = (ranged(figures["ratios"][name], 2) for name in BARS)
+    return [
+        Row(
+            f"one chromatic render ({how}) over three grey ones of the same channels",
+            f"{sample} times with absorption `sample`, {mixed} with `mixed`",
+        )
+    ]
+
+
+@click.command()
+@click.option("--res", default=64, show_default=True)
+@click.option("--spp", default=128, show_default=True)
+@click.option("--rounds", default=6, show_default=True, type=click.IntRange(min=2))
+@click.option("--technique", default="auto", show_default=True, help="The chromatic side's.")
+@click.option("--device", metavar="PATTERN", help="Part of the device's name; see clvol devices.")
+def main(
+    res: int, spp: int, rounds: int, technique: str, device: str | None
+) -> tuple[None, dict[str, Figures]]:
+    """Compare a chromatic render with three grey ones, in efficiency: 1 / (variance x CPU time)."""
+    figures = measure_chromatic(res, spp, rounds, technique, device)
+    show_chromatic(figures)
+    return None, {"chromatic": figures}
 
 
 if __name__ == "__main__":

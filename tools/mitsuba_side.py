@@ -27,7 +27,7 @@ def mitsuba_python(given: str | None) -> str:
     if not ready.exists():
         click.echo(f"installing {REQUIREMENT} in {folder}", err=True)
         subprocess.run([sys.executable, "-m", "venv", folder], check=True)
-        subprocess.run([python, "-m", "pip", "install", "--quiet", REQUIREMENT], check=True)
+        subprocess.run([python, "-m", "pip", "install", "--quiet", REQUIREMENT, "numpy"], check=True)
         ready.touch()
     return str(python)
 

@@ -162,10 +162,12 @@ def measure(
     are complete; KeyboardInterrupt where they are fewer than `efficiency.LEAST_ROUNDS`.
     """
     clock = _Clock(told)
-    seeds = seeds_from(plan.seed, given.seeds if given else None)
+    taken = given.seeds if given else None
+    # How many trials there are depends on the machine's pace; the rounds' seeds do not.
+    seeds, trial_seeds = seeds_from(plan.seed, taken), seeds_from((plan.seed + 2**63) % 2**64, taken)
     entrants = [_Entrant(label, trial, clock.tick) for label, trial in lineup.trials.items()]
     for entrant in entrants:
-        entrant.try_out(seeds, plan.spp)
+        entrant.try_out(trial_seeds, plan.spp)
         entrant.spp = plan.spp or _samples(plan.seconds / plan.rounds / max(entrant.pace, 1e-9), lineup)
     shorter = [
         (e, spp, replace(e, spp=spp, label=f"{e.label}, {spp} spp"))
@@ -174,7 +176,7 @@ def measure(
     ]
     running = [*entrants, *(short for *_, short in shorter)]
     if given is None:
-        running.append(_reference_entrant(entrants, lineup, plan, spare, seeds, clock))
+        running.append(_reference_entrant(entrants, lineup, plan, spare, trial_seeds, clock))
     clock.expect({e.label: e.pace * e.spp for e in running}, plan.rounds)
     done: list[list[_Render]] = []
     interrupted = False
@@ -220,14 +222,14 @@ def _reference_entrant(
     lineup: Lineup,
     plan: Plan,
     spare: Callable[[], Trial],
-    seeds: Iterator[int],
+    trial_seeds: Iterator[int],
     clock: _Clock,
 ) -> _Entrant:
     """The most efficient unbiased combination of the trial, again, with many more samples."""
     unbiased = [e for e in entrants if not e.trial.biased]
     if not unbiased:
         unbiased = [_Entrant("auto", spare(), clock.tick)]
-        unbiased[0].try_out(seeds, plan.spp)
+        unbiased[0].try_out(trial_seeds, plan.spp)
         unbiased[0].spp = plan.spp or _samples(plan.seconds / plan.rounds / unbiased[0].pace, lineup)
     best = min(unbiased, key=lambda e: e.variance * e.pace)
     spp = _samples(REFERENCE_SAMPLES * best.spp, lineup)
