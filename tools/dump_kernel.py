@@ -8,9 +8,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
-from scene_options import choice_options, definitions_option, open_scene
+from scene_options import choice_options, open_scene
 
-from clvol.cli_options import ExplainedCommand, fail
+from clvol.cli_options import ExplainedCommand, definitions_option, fail
 from clvol.config import KernelConfig
 from clvol.errors import DeviceError, Error
 from clvol.programs import stage_source

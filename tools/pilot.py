@@ -20,6 +20,7 @@ from rich.console import Console
 from rich.progress import track
 
 from clvol.choices import Choices
+from clvol.cli_options import device_option
 from clvol.device import open_device
 from clvol.measure.candidates import Candidate, Relative, error, inverse_efficiency, relative_efficiency
 from clvol.measure.combinations import independent_seeds, unbiased
@@ -88,23 +89,15 @@ def unmet(pilot: Pilot, count: int) -> list[Candidate]:
     """So many combinations that the search did not meet, drawn from all that are possible and compose kernels
     of their own; rendered as often as the search does at first, hopelessly slow ones once.
     """
-    auto = pilot.candidates[0]
-    seen = {pilot._sources(c.trial.session.config) for c in pilot.candidates}
     product = list(itertools.product(*(unbiased(family) for family in CHOSEN)))
-    added: list[Candidate] = []
-    for place in np.random.default_rng(0).permutation(len(product)):
-        if len(added) == count:
-            break
-        names = dict(zip(CHOSEN, product[place], strict=True))
-        choices = replace(pilot.choices, **names)
-        sources = pilot._sources(replace(auto.trial.session.config, **names))
-        if sources not in seen and pilot._possible(choices) and pilot._fits(auto):
-            seen.add(sources)
-            added.append(pilot._open(choices))
+    drawn = (product[place] for place in np.random.default_rng(0).permutation(len(product)))
+    asked = (replace(pilot.choices, **dict(zip(CHOSEN, names, strict=True))) for names in drawn)
+    added = list(itertools.islice(pilot.admitted(asked, list(pilot.candidates)), count))
+    auto = pilot.candidates[0]
     limit = SLOW * float(np.median(auto.seconds))
     for candidate in added:
         while len(candidate.images) < ROUNDS and (not candidate.seconds or candidate.seconds[-1] < limit):
-            pilot._render(candidate)
+            pilot.render(candidate)
     return added
 
 
@@ -158,7 +151,7 @@ def half(candidate: Candidate, which: int) -> Candidate:
 def pilot_options(command: Callable) -> Callable:
     """What a test of the pilot may be asked."""
     for option in (
-        click.option("--device", metavar="PATTERN", help="Part of the device's name; see clvol devices."),
+        device_option,
         click.option("--scene", "scenes", multiple=True, type=click.Choice(list(SCENES)), help="Only these."),
         click.option(
             "--more",

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import click
 
 from clvol.choices import Choices, prepare_for
-from clvol.cli_options import Definition, RegistryChoice
+from clvol.cli_options import RegistryChoice, device_option
 from clvol.config import KernelConfig
 from clvol.device import Device, open_device
 from clvol.prepare import PreparedScene
@@ -49,18 +49,7 @@ def open_scene(
 
 def choice_options(command: Callable) -> Callable:
     """One option for each family of choices in `clvol.registry`, and the device."""
-    device = click.option("--device", metavar="PATTERN", help="Part of the device's name; see clvol devices.")
-    command = device(command)
+    command = device_option(command)
     for family in reversed(FAMILIES):
         command = click.option(f"--{family}", type=RegistryChoice(family), default="auto")(command)
     return command
-
-
-definitions_option = click.option(
-    "-D",
-    "definitions",
-    type=Definition(),
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Fill $NAME in the scene.",
-)

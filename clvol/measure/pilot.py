@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from clvol.choices import Choices, majorant_needs, prepare_for, refuse_impossible, resolve
@@ -150,7 +150,7 @@ class Pilot:
         both, first = (best, auto), (len(best.images), len(auto.images))
         for turn in range(FINAL_ROUNDS):
             for candidate in both if turn % 2 else both[::-1]:
-                self._render(candidate)
+                self.render(candidate)
         fresh = [candidate.since(n) for candidate, n in zip(both, first, strict=True)]
         return Relative(0.0, 0.0, 0.0) if doubtful(*fresh, fresh) else relative_efficiency(*fresh)
 
@@ -192,7 +192,7 @@ class Pilot:
             measured = candidates if auto in candidates else [auto, *candidates]
             for turn in range(ROUNDS):
                 for n in range(len(measured)):
-                    self._render(measured[(n + turn) % len(measured)])
+                    self.render(measured[(n + turn) % len(measured)])
                 slow = HOPELESS * auto.seconds[-1]
                 measured = [c for c in measured if c in (candidates[0], auto) or c.seconds[-1] < slow]
             kept = halve([c for c in candidates if c in measured], auto, measured)
@@ -205,19 +205,24 @@ class Pilot:
         return candidates[0]
 
     def _others(self, family: str, best: Candidate) -> list[Candidate]:
-        """Candidates with the family's other choices, but for those that cannot be right, and those that
-        compose the same kernels as one that is there."""
+        """Candidates with the family's other choices."""
         config = best.trial.session.config
         if getattr(config, family) not in FAMILIES[family]:
             return []  # no majorant is walked
-        seen, found = {self._sources(config)}, []
-        for name in unbiased(family):
-            choices = replace(best.trial.choices, **{family: name})
-            sources = self._sources(replace(config, **{family: name}))
-            if sources not in seen and self._possible(choices) and self._fits(best):
+        asked = (replace(best.trial.choices, **{family: name}) for name in unbiased(family))
+        return list(self.admitted(asked, [best]))
+
+    def admitted(self, asked: Iterable[Choices], among: list[Candidate]) -> Iterator[Candidate]:
+        """Candidates of the choices asked for, but for those that cannot be right, and those that compose the
+        same kernels as one of `among` or of each other; like `among[0]` in all that they leave at auto."""
+        config = among[0].trial.session.config
+        seen = {self._sources(c.trial.session.config) for c in among}
+        for choices in asked:
+            names = {family: choices.names[family] for family in CHOSEN}
+            sources = self._sources(replace(config, **{f: n for f, n in names.items() if n != "auto"}))
+            if sources not in seen and self._possible(choices) and self._fits(among[0]):
                 seen.add(sources)
-                found.append(self._open(choices))
-        return found
+                yield self._open(choices)
 
     def _close(self, candidates: list[Candidate]) -> None:
         """Give back the device's memory of those that are out."""
@@ -245,7 +250,8 @@ class Pilot:
     def _sources(config: KernelConfig) -> tuple[str, ...]:
         return tuple(stage_source(config, stage) for stage in config.stages)
 
-    def _render(self, candidate: Candidate) -> None:
+    def render(self, candidate: Candidate) -> None:
+        """Another round of a candidate, counted and told."""
         candidate.render(next(self.seeds), self.spp)
         self.seconds += candidate.seconds[-1]
         candidate.extra = precomputation(
