@@ -7,7 +7,7 @@
 #define CLVOL_CORE_RANDOM_H
 
 /* Blocks of four dimensions within one bounce. */
-#define BLOCK_CAMERA 0u    /* pixel x, pixel y, -, - */
+#define BLOCK_CAMERA 0u    /* pixel x, pixel y, place on the lens (2) */
 #define BLOCK_WALK 1u      /* first distance, event, stream seed (2); one block per interval walked */
 #define BLOCK_LIGHT 2u     /* light choice, light point (2), - */
 #define BLOCK_DIRECTION 3u /* scattered direction (2), roulette, lobe of the phase function */

@@ -139,7 +139,7 @@ INLINE float3 area_radiance(const Scene *scene, const Surface *surface, float3 d
 }
 
 /* Density with which sample_light(from) would have chosen the unit direction d in which the surface is `distance`
-   away; `from` must be the very point that lights are sampled from. */
+   away; `from`: where lights were sampled from, up to the offset of the ray's start (spawn_point). */
 INLINE float area_pdf(const Scene *scene, const Surface *surface, float3 from, float3 d, float distance)
 {
     __global const Emitter *emitter = seen_light(scene, surface, d);

@@ -1,7 +1,7 @@
-/* From: GENERATE
+/* From: GENERATE, and idle slots once there are jobs again
    To: INTERSECT (a new path); a slot for which there is no job stays idle
-   Reads: the finished path, the job counter.
-   Writes: results, every field of a new path. */
+   Reads: the finished path, the job counter and its limit.
+   Writes: results, every field of a new path that is read before it is set. */
 #include "stages/generate.h"
 
 __kernel __attribute__((reqd_work_group_size(CLVOL_LOCAL_SIZE, 1, 1))) void generate_kernel(CLVOL_ARGUMENTS)

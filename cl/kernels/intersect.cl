@@ -1,7 +1,7 @@
 /* From: INTERSECT
-   To: MEDIUM (an interval lies ahead), SHADE (escape, or the nearest of several collisions)
-   Reads: ray, media bounds.
-   Writes: the interval. */
+   To: MEDIUM (a medium lies ahead, before any surface), SHADE (a surface, or escape)
+   Reads: ray, the media it is inside of, media bounds, surfaces.
+   Writes: event, hit, what the camera is inside of; for a lone medium its interval, and the ray moved there. */
 #include "stages/intersect.h"
 
 __kernel __attribute__((reqd_work_group_size(CLVOL_LOCAL_SIZE, 1, 1))) void intersect_kernel(CLVOL_ARGUMENTS)

@@ -1,7 +1,7 @@
 /* From: MEDIUM
-   To: SHADE (collision or escape), INTERSECT (more media may follow)
-   Reads: ray, interval, majorants, volumes.
-   Writes: collision point or event, look-ups. */
+   To: SHADE (a collision, or what `intersect` found behind the media)
+   Reads: ray, interval or hit, the media it is inside of, beta, majorants, volumes.
+   Writes: at a collision its place, event and medium; beta; radiance that media emit; counts. */
 #include "stages/medium_sample.h"
 
 __kernel __attribute__((reqd_work_group_size(CLVOL_LOCAL_SIZE, 1, 1))) void medium_sample_kernel(CLVOL_ARGUMENTS)

@@ -1,7 +1,7 @@
 /* From: SHADE
-   To: INTERSECT (the path goes on), GENERATE (it ended), SHADOW (next-event estimation)
-   Reads: event, ray, beta, media, emitters.
-   Writes: radiance, beta, the next ray, the shadow ray. */
+   To: INTERSECT (the path goes on) or GENERATE (it ended), and SHADOW (next-event estimation)
+   Reads: event, ray, hit, beta, what it is inside of, media, surfaces, emitters.
+   Writes: radiance, beta, the next ray, its bounce and what it is inside of; the shadow ray; first hits, energy cut. */
 #include "stages/shade.h"
 
 __kernel __attribute__((reqd_work_group_size(CLVOL_LOCAL_SIZE, 1, 1))) void shade_kernel(CLVOL_ARGUMENTS)

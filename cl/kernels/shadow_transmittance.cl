@@ -1,7 +1,7 @@
 /* From: SHADOW
    To: none
-   Reads: vertex, shadow ray, media, majorants, volumes.
-   Writes: radiance, look-ups. */
+   Reads: shadow ray, what it is inside of, its light, media, majorants, volumes, surfaces.
+   Writes: radiance, counts. */
 #include "stages/shadow_transmittance.h"
 
 __kernel __attribute__((reqd_work_group_size(CLVOL_LOCAL_SIZE, 1, 1))) void shadow_transmittance_kernel(CLVOL_ARGUMENTS)
