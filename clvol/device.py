@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
 from dataclasses import dataclass, field
 from functools import cache, cached_property
+from typing import Any
 
 import pyopencl as cl
 
+from clvol import kernel_cache
+from clvol.device_memory import DeviceMemory
 from clvol.errors import DeviceError
 
 _KINDS = ("GPU", "ACCELERATOR", "CPU")
+_POCL = "Portable Computing Language"
+_LINKER_SECONDS = 30
 
 
 @dataclass(frozen=True)
@@ -50,35 +56,72 @@ class Device:
     def description(self) -> str:
         return f"{self.info.name} ({self.info.platform})"
 
-    def allocate(self, size: int, what: str, hint: str) -> cl.Buffer:
-        """An uninitialised buffer of `size` bytes; DeviceError where the device has no room for `what`."""
-        limit = int(self.queue.device.max_mem_alloc_size)
-        if size > limit:
-            sizes = f"a buffer of {size / 2**20:.0f} MiB, where {limit / 2**20:.0f} are allowed"
-            raise DeviceError(f"{what} needs {sizes} on {self.description}", hint=hint)
-        try:
-            return cl.Buffer(self.context, cl.mem_flags.READ_WRITE, max(size, 4))
-        except cl.Error as error:
-            raise DeviceError(
-                f"{self.description} has no {size / 2**20:.0f} MiB for {what}", hint=hint
-            ) from error
+    @cached_property
+    def memory(self) -> DeviceMemory:
+        """Where buffers are made."""
+        device = self.queue.device
+        return DeviceMemory(
+            self.context,
+            self.description,
+            total=int(device.global_mem_size),
+            largest=int(device.max_mem_alloc_size),
+            shared=bool(device.host_unified_memory),
+        )
 
 
-def _found() -> list[tuple[DeviceInfo, cl.Device]]:
+def set_arguments(kernel: cl.Kernel, *values: Any) -> None:
+    """Bind every argument of a kernel.
+
+    One by one: pyopencl's own call for all goes through a cache in the user's home, which may be damaged.
+    """
+    for number, value in enumerate(values):
+        kernel.set_arg(number, value)
+
+
+@dataclass(eq=False)
+class _Drivers:
+    """Every device there is, and what drivers said that have none."""
+
+    devices: list[tuple[DeviceInfo, cl.Device]]
+    failures: list[str]
+
+
+_in_use_by: int | None = None
+"""The process that first asked a driver for its devices."""
+
+
+def _refuse_after_fork() -> None:
+    """Drivers' threads do not come along into a forked process, which then waits for them for ever."""
+    if _in_use_by not in (None, os.getpid()):
+        raise DeviceError(
+            "OpenCL was in use before this process was forked from its parent, and would hang in it",
+            hint='start workers with multiprocessing.get_context("spawn"), or before anything is rendered',
+        )
+
+
+def _found() -> _Drivers:
+    global _in_use_by
+    _refuse_after_fork()
+    _in_use_by = os.getpid()
+    kernel_cache.kernel_folder()  # PoCL reads its variable when it is first asked
+    drivers = _Drivers([], [])
     try:
         platforms = cl.get_platforms()
-    except cl.Error:
+    except cl.Error as error:
         platforms = []
-    found = []
+        if error.code != cl.status_code.PLATFORM_NOT_FOUND_KHR:
+            drivers.failures.append(str(error))
     for platform in platforms:
         try:
             devices = platform.get_devices()
-        except cl.Error:
-            continue
+        except cl.Error as error:
+            devices = []
+            if error.code != cl.status_code.DEVICE_NOT_FOUND:
+                drivers.failures.append(f"{platform.name.strip()}: {error}")
         for device in devices:
             kind = next((name for name in _KINDS if device.type & getattr(cl.device_type, name)), "CUSTOM")
             info = DeviceInfo(
-                len(found),
+                len(drivers.devices),
                 platform.name.strip(),
                 device.name.strip(),
                 device.version.strip(),
@@ -86,13 +129,13 @@ def _found() -> list[tuple[DeviceInfo, cl.Device]]:
                 device.max_compute_units,
                 device.global_mem_size,
             )
-            found.append((info, device))
-    return found
+            drivers.devices.append((info, device))
+    return drivers
 
 
 def list_devices() -> list[DeviceInfo]:
     """Every OpenCL device of this machine, in the order `--device` numbers them."""
-    return [info for info, _ in _found()]
+    return [info for info, _ in _found().devices]
 
 
 def open_device(pattern: str | None = None) -> Device:
@@ -101,7 +144,10 @@ def open_device(pattern: str | None = None) -> Device:
     Without a pattern, the variable CLVOL_DEVICE, then the first GPU, then the first device.
     Raises DeviceError where there is none.
     """
-    found = _found()
+    drivers = _found()
+    found = drivers.devices
+    if not found and drivers.failures:
+        raise DeviceError(f"no OpenCL device can be used: {'; '.join(drivers.failures)}")
     if not found:
         raise DeviceError(
             "no OpenCL device found",
@@ -121,9 +167,26 @@ def open_device(pattern: str | None = None) -> Device:
 @cache
 def _open(index: int) -> Device:
     """One context and queue per device and process."""
-    info, device = _found()[index]
-    if "Portable Computing Language" in info.platform and shutil.which("ld") is None:
-        raise DeviceError("PoCL needs the linker `ld` to build kernels", hint="install binutils")
+    info, device = _found().devices[index]
+    kernel_cache.open_call_cache()
+    if _POCL in info.platform:
+        _prepare_pocl()
     context = cl.Context([device])
     queue = cl.CommandQueue(context, properties=cl.command_queue_properties.PROFILING_ENABLE)
     return Device(info, context, queue)
+
+
+def _prepare_pocl() -> None:
+    """See to what PoCL needs to build kernels, since it ends the process where that is missing."""
+    os.environ.setdefault("PATH", os.defpath)  # where it looks for the linker
+    linker = shutil.which("ld")
+    if linker is None:
+        raise DeviceError("PoCL needs the linker `ld` to build kernels", hint="install binutils")
+    try:
+        subprocess.run([linker, "--version"], capture_output=True, check=True, timeout=_LINKER_SECONDS)
+    except (OSError, subprocess.SubprocessError) as error:
+        raise DeviceError(
+            f"PoCL needs the linker `ld` to build kernels, and {linker} does not run ({error})",
+            hint="reinstall binutils, or put another ld first on PATH",
+        ) from None
+    kernel_cache.check(kernel_cache.kernel_folder())

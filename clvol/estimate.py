@@ -87,13 +87,18 @@ class Replicates:
 
     def mean_and_variance(self) -> tuple[np.ndarray, np.ndarray]:
         """Mean, and its variance by the scatter of the randomisations' means; inf where there is only one."""
-        mean = self.sum_ / self.count
+        mean = self.sum_
+        mean /= self.count
         if self.dof < 1:
             return mean, np.full_like(mean, np.inf)
-        variance = np.zeros_like(mean)
+        variance, deviation = np.zeros_like(mean), np.empty_like(mean)
         for total, count, weight in zip(self.sums, self.counts, self._weights(), strict=True):
-            if count:
-                variance += weight * (total / count - mean) ** 2
+            if count:  # in place: large pictures are short of memory just here
+                np.divide(total, count, out=deviation)
+                deviation -= mean
+                deviation *= deviation
+                deviation *= weight
+                variance += deviation
         return mean, variance
 
     def _weights(self) -> np.ndarray:
@@ -116,7 +121,9 @@ class Replicates:
 
     def reshaped(self, *shape: int) -> Replicates:
         """The same in another shape, broadcast to it."""
-        return Replicates(np.stack([_fit(total, shape) for total in self.sums]), self.counts)
+        parts = len(self.sums)
+        flat = np.broadcast_to(self.sums, (*self.sums.shape[:-1], shape[-1]))
+        return Replicates(flat.reshape(parts, *shape), self.counts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +166,7 @@ Estimate = Moments | Replicates | Uneven
 def _fit(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """(pixels, 1 or channels) as (…, channels), float64."""
     flat = np.broadcast_to(array, (array.shape[0], shape[-1]))
-    return flat.reshape(shape).astype(np.float64)
+    return flat.reshape(shape)
 
 
 def error_bias(dof: float) -> float:

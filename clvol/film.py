@@ -15,6 +15,10 @@ from clvol.device import Device
 from clvol.estimate import Estimate, Moments, Replicates, Uneven
 from clvol.sobol import samples_of_each
 
+_READ_PIXELS = 1 << 18
+HOST_BYTES = 250
+"""Bytes a pixel that making a picture of the film takes at most, beside the film itself."""
+
 
 class Film:
     """Sums over the samples of one seed.
@@ -39,7 +43,9 @@ class Film:
         if self.firsts:
             sizes["film_firsts"] = 8 * len(self.firsts) * pixels
         what, hint = f"a film of {pixels} pixels", "render fewer pixels"
-        self.buffers = {name: device.allocate(size, what, hint) for name, size in sizes.items()}
+        self.buffers = {name: device.memory.allocate(size, what, hint) for name, size in sizes.items()}
+        if device.memory.shared:
+            device.memory.require(HOST_BYTES * pixels, f"a picture of {pixels} pixels", hint)
         self.clear(seed)
 
     def clear(self, seed: tuple[int, int]) -> None:
@@ -57,10 +63,24 @@ class Film:
         return array
 
     def _sums(self) -> np.ndarray:
-        """Of each randomisation, or of samples and squares; float64 (parts, pixels, channels)."""
-        parts = self.config.randomizations or 2
-        film = self._read("film", (self.pixels, parts, self.config.channels, 2), np.float32)
-        return np.moveaxis(film[..., 0].astype(np.float64) + film[..., 1], 1, 0)
+        """Of each randomisation, or of samples and squares; float64 (parts, pixels, channels).
+
+        Read a part of the pixels at a time: the device's pairs of floats take as much as the sums.
+        """
+        parts, channels = self.config.randomizations or 2, self.config.channels
+        sums = np.empty((parts, self.pixels, channels))
+        for first in range(0, self.pixels, _READ_PIXELS):
+            count = min(_READ_PIXELS, self.pixels - first)
+            pairs = np.empty((count, parts, channels, 2), np.float32)
+            at = first * parts * channels * 8
+            cl.enqueue_copy(self.device.queue, pairs, self.buffers["film"], src_offset=at, is_blocking=True)
+            np.add(
+                pairs[..., 0].swapaxes(0, 1),
+                pairs[..., 1].swapaxes(0, 1),
+                out=sums[:, first : first + count],
+                dtype=np.float64,
+            )
+        return sums
 
     def estimate(self, first: int, count: int) -> Estimate:
         """What the samples `first` to `first + count`, all rendered, add up to; (pixels, channels)."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clvol import registry
+from clvol.estimate import Estimate
 from clvol.result import Result
 from clvol.scene.digest import scene_digest
 from clvol.version import __version__
@@ -29,8 +30,7 @@ def make_result(session: Session, first: int, count: int) -> Result:
     else:
         estimate, samples = film.estimate(first, count), np.full(film.pixels, count)
     stats = statistics(session, int(samples.sum()))
-    _, variance = estimate.mean_and_variance()
-    pictures = _pictures(session, samples, variance)
+    pictures = _pictures(session, samples, estimate)
     aovs = {name: values.reshape(*shape, *values.shape[1:]) for name, values in pictures.items()}
     return Result.from_estimate(
         estimate.reshaped(*shape, 3), (first, count), aovs, stats, _metadata(session, samples)
@@ -55,7 +55,7 @@ def _metadata(session: Session, samples: np.ndarray) -> dict[str, Any]:
     }
 
 
-def _pictures(session: Session, samples: np.ndarray, variance: np.ndarray) -> dict[str, np.ndarray]:
+def _pictures(session: Session, samples: np.ndarray, estimate: Estimate) -> dict[str, np.ndarray]:
     """Look-ups and what `aov` asks for: means per sample, and the largest weight; float32 (pixels[, 3])."""
     film, config = session.wavefront.film, session.config
     sums, peaks, nothing = film.counts(), film.peaks_by_pixel(), np.zeros(film.pixels)
@@ -71,13 +71,18 @@ def _pictures(session: Session, samples: np.ndarray, variance: np.ndarray) -> di
         elif name == "samples":
             values = samples
         elif name == "variance":
-            values = variance.mean(axis=-1) * samples
+            values = _variance(estimate) * samples
         elif name == "efficiency":
-            values = _efficiency(session, sums, samples, variance)
+            values = _efficiency(session, sums, samples, _variance(estimate))
         else:
             values = counts.get(name, nothing)
         found[name] = np.asarray(values, np.float32)
     return found
+
+
+def _variance(estimate: Estimate) -> np.ndarray:
+    """Of each pixel's mean, the mean of the channels', float64 (pixels,)."""
+    return estimate.mean_and_variance()[1].mean(axis=-1)
 
 
 def _efficiency(
@@ -94,7 +99,7 @@ def _efficiency(
     even = samples / samples.sum()
     share = work / work.sum() if work.sum() > 0 else even
     spent = walking * share + (sum(seconds.values()) - walking) * even
-    cost = variance.mean(axis=-1) * spent
+    cost = variance * spent
     known = np.isfinite(cost) & (cost > 0)
     return np.divide(1.0, cost, out=np.zeros(film.pixels), where=known)
 

@@ -97,8 +97,9 @@ def _surface_arrays(prepared: PreparedScene, lights: LightTable) -> dict[str, np
 
 
 def _buffer(device: Device, array: np.ndarray) -> cl.Buffer:
-    flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
-    return cl.Buffer(device.context, flags, hostbuf=np.ascontiguousarray(array))
+    return device.memory.upload(
+        array, "the scene", "use a device with more memory, or simpler meshes and pictures"
+    )
 
 
 def _table(device: Device, parts: list[np.ndarray]) -> cl.Buffer:
@@ -123,7 +124,7 @@ def _volume_buffers(device: Device, prepared: PreparedScene) -> dict[str, cl.Buf
         tops.append(bricks.top.reshape(-1) * np.int32(bricks.channels))
         top_offset += bricks.top.size
         brick_offset += bricks.brick_count * bricks.channels
-    pool = device.allocate(
+    pool = device.memory.allocate(
         brick_offset * BRICK_SAMPLES * 4,
         "the scene's volumes",
         "use a device with more memory, or a volume of lower resolution",

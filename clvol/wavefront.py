@@ -17,7 +17,7 @@ import pyopencl as cl
 
 from clvol import layout
 from clvol.config import KernelConfig
-from clvol.device import Device
+from clvol.device import Device, set_arguments
 from clvol.errors import OptionError
 from clvol.film import Film
 
@@ -119,7 +119,7 @@ class Wavefront:
             for argument in layout.arguments(self.config)
         ]
         for stage in self.config.stages:
-            self.kernels[stage].set_args(*values)
+            set_arguments(self.kernels[stage], *values)
         self.list_pixels(None)
 
     def restart(self, seed: tuple[int, int]) -> None:
@@ -143,7 +143,7 @@ class Wavefront:
         self.launches = self.waves = 0
 
     def _buffer(self, size: int) -> cl.Buffer:
-        return self.device.allocate(size, f"a film of {self.pixels} pixels", "render fewer pixels")
+        return self.device.memory.allocate(size, f"a film of {self.pixels} pixels", "render fewer pixels")
 
     def _write(self, name: str, array: np.ndarray, offset: int = 0) -> None:
         cl.enqueue_copy(self.device.queue, self.buffers[name], array, dst_offset=offset, is_blocking=True)
@@ -271,10 +271,9 @@ class Wavefront:
     def _accumulate(self, ring_pass: int, samples: int, first: int) -> None:
         """Add one finished pass, from sample `first` on, to the film and free its place in the ring."""
         local, film = 64, self.film.buffers
-        event = self.kernels["accumulate"](
-            self.device.queue,
-            (-(-self.listed // local) * local,),
-            (local,),
+        kernel = self.kernels["accumulate"]
+        set_arguments(
+            kernel,
             self.buffers["results"],
             *(film[name] for name in ("film", "film_peaks")),
             *((self.buffers["result_counts"],) if "result_counts" in self.buffers else ()),
@@ -288,6 +287,8 @@ class Wavefront:
             np.uint32(first),
             np.uint32(self.listed),
         )
+        size = -(-self.listed // local) * local
+        event = cl.enqueue_nd_range_kernel(self.device.queue, kernel, (size,), (local,))
         event.wait()
         self.launches += 1
         self.seconds["accumulate"] += 1e-9 * (event.profile.end - event.profile.start)

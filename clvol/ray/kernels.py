@@ -16,7 +16,7 @@ import pyopencl as cl
 from clvol import layout, programs, registry
 from clvol.choices import Choices, prepare_for
 from clvol.config import KernelConfig
-from clvol.device import Device
+from clvol.device import Device, set_arguments
 from clvol.prepare import PreparedScene
 from clvol.scene.records import Scene
 from clvol.session import kernel_config, render_record, seed_words
@@ -47,7 +47,7 @@ class RayKernels:
         prepared = prepare_for(scene, choices)
         config = kernel_config(prepared, choices, device)
         buffers = upload_scene(device, prepared, config, choices.step)
-        buffers["render"] = _filled(device, render_record(prepared, 0))
+        buffers["render"] = device.memory.upload(render_record(prepared, 0), "the camera")
         return cls(device, choices, prepared, config, buffers)
 
     def places(self, origin: np.ndarray, direction: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
@@ -118,18 +118,15 @@ class RayKernels:
         """Run cl/ray/`name`.cl for `count` work-items; `outputs` go in and come back."""
         source = programs.compose(self.config, headers, f'{text}#include "ray/{name}.cl"\n')
         kernel = cl.Kernel(programs.build(self.device, source, f"ray/{name}"), name)
-        unused = cl.Buffer(self.device.context, cl.mem_flags.READ_WRITE, 4)
+        memory = self.device.memory
+        unused = memory.allocate(4, "an argument", "")
         scene = [
             np.uint32(1) if a.name == "slot_stride" else self.buffers.get(a.name, unused)
             for a in layout.arguments(self.config)
         ]
-        arrays = [_filled(self.device, array) for array in (*inputs, *outputs)]
-        kernel(self.device.queue, (-(-count // GROUP) * GROUP,), (GROUP,), *scene, *arrays, *scalars)
+        arrays = [memory.upload(array, "the walks", "watch fewer of them") for array in (*inputs, *outputs)]
+        set_arguments(kernel, *scene, *arrays, *scalars)
+        cl.enqueue_nd_range_kernel(self.device.queue, kernel, (-(-count // GROUP) * GROUP,), (GROUP,))
         for host, buffer in zip(outputs, arrays[len(inputs) :], strict=True):
             if host.size:
                 cl.enqueue_copy(self.device.queue, host, buffer, is_blocking=True)
-
-
-def _filled(device: Device, array: np.ndarray) -> cl.Buffer:
-    flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
-    return cl.Buffer(device.context, flags, hostbuf=np.ascontiguousarray(array))
