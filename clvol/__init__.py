@@ -13,19 +13,23 @@ from clvol.version import __version__
 
 _EXPORTS = {
     "compare": "clvol.comparison",
+    "DeviceError": "clvol.errors",
     "Error": "clvol.errors",
     "load_dict": "clvol.scene",
     "load_file": "clvol.scene",
     "look_at": "clvol.scene",
     "merge": "clvol.result",
+    "OptionError": "clvol.errors",
     "render": "clvol.renderer",
     "Result": "clvol.result",
     "rotate": "clvol.scene",
     "scale": "clvol.scene",
     "Scene": "clvol.scene.records",
+    "SceneError": "clvol.errors",
     "selftest": "clvol.measure.selftests",
     "trace_ray": "clvol.ray.trace",
     "translate": "clvol.scene",
+    "VolumeError": "clvol.errors",
 }
 
 __all__ = ["__version__", *_EXPORTS]

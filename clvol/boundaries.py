@@ -25,7 +25,8 @@ class MediumEntry:
     """One medium as the device knows it.
 
     shape : the shape whose interval bounds it, or None where boundaries do.
-    everywhere : it fills all that no boundary takes away: a medium that is only ever an exterior.
+    everywhere : it fills all that no boundary takes away: a medium that is only ever an exterior, or that the
+        sensor names, or both sides of a surface, and no shape holds.
     """
 
     medium: records.Medium
@@ -95,6 +96,12 @@ def find_boundaries(scene: records.Scene) -> Boundaries:
             if medium is not None and id(medium) not in entry_of:
                 entry_of[id(medium)] = len(entries)
                 entries.append(MediumEntry(medium, None, id(medium) not in holders))
+    known = {id(entry.medium) for entry in entries}
+    around = [shape.interior for shape, does in zip(shapes, divides, strict=True) if not does]
+    for medium in (*around, scene.sensor.medium):
+        if medium is not None and id(medium) not in known:
+            known.add(id(medium))
+            entries.append(MediumEntry(medium, None, True))
     boundaries = tuple(
         Boundary(
             index,

@@ -5,13 +5,12 @@ Every refusal is one sentence on why, and one on what to use.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from numbers import Real
 
 from clvol import registry
-from clvol.errors import OptionError
+from clvol.arguments import positive
+from clvol.errors import OptionError, shown
 from clvol.features import Features
 from clvol.prepare import MajorantNeeds, PreparedScene, prepare
 from clvol.scene.records import Scene
@@ -48,10 +47,10 @@ class Choices:
         for family in registry.FAMILIES:
             registry.check_choice(family, getattr(self, family))
         object.__setattr__(self, "aov", _aovs(self.aov))
-        _check_positive("majorant_scale", self.majorant_scale)
+        positive("majorant_scale=", self.majorant_scale)
         for name in ("step", "target_error"):
             if getattr(self, name) is not None:
-                _check_positive(name, getattr(self, name))
+                positive(f"{name}=", getattr(self, name))
 
     @property
     def names(self) -> dict[str, str]:
@@ -59,20 +58,15 @@ class Choices:
         return {family: getattr(self, family) for family in registry.FAMILIES}
 
 
-def _check_positive(name: str, value: float) -> None:
-    if isinstance(value, bool) or not isinstance(value, Real) or not 0 < value < math.inf:
-        raise OptionError(f"{name}={value!r} is not a positive number")
-
-
 def _aovs(names: str | Iterable[str]) -> tuple[str, ...]:
     names = (names,) if isinstance(names, str) else names
     if not isinstance(names, Iterable):
         raise OptionError(
-            f"aov={names!r} is not a list of names", hint=f"choose among {', '.join(registry.AOVS)}"
+            f"aov={shown(names)} is not a list of names", hint=f"choose among {', '.join(registry.AOVS)}"
         )
     for name in names:
-        if name not in registry.AOVS:
-            raise OptionError(f"unknown aov {name!r}", hint=f"choose among {', '.join(registry.AOVS)}")
+        if not isinstance(name, str) or name not in registry.AOVS:
+            raise OptionError(f"unknown aov {shown(name)}", hint=f"choose among {', '.join(registry.AOVS)}")
     return tuple(dict.fromkeys(names))
 
 

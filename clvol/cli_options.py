@@ -9,9 +9,11 @@ from typing import Any, NoReturn
 
 import click
 
-from clvol.errors import DeviceError, Error, OptionError
+from clvol.errors import DeviceError, Error, OptionError, shortened
 
 USER_ERROR = 2
+LONGEST_LINE = 3000
+"""Characters of an error's line at most, whatever was on the command line."""
 PILOT_HELP = [("auto:pilot", "measures, then picks the technique, transmittance and majorant left at auto")]
 INTERRUPTED = 130
 
@@ -52,7 +54,8 @@ class OneLineErrors(click.Group):
 
 def fail(message: str, whole: bool = False) -> NoReturn:
     """Print one line on standard error, or the `whole` text (a build log), and exit with status 2."""
-    click.echo(f"clvol: error: {message if whole else ' '.join(message.split())}", err=True)
+    line = message if whole else shortened(" ".join(message.split()), LONGEST_LINE)
+    click.echo(f"clvol: error: {line}", err=True)
     sys.exit(USER_ERROR)
 
 

@@ -126,11 +126,12 @@ def _scene_lines(scene: records.Scene) -> Iterator[str]:
 
 def _camera(sensor: records.Perspective) -> str:
     position, fov = _point(sensor.to_world[:3, 3]), _number(sensor.fov)
+    inside = f", in {_medium(sensor.medium)}" if sensor.medium else ""
     if not sensor.aperture_radius:
-        return f"perspective at {position}, field of view {fov} degrees"
+        return f"perspective at {position}, field of view {fov} degrees{inside}"
     radius, distance = _number(sensor.aperture_radius), _number(sensor.focus_distance)
     lens = f"aperture radius {radius}, in focus at {distance}"
-    return f"thin lens at {position}, field of view {fov} degrees, {lens}"
+    return f"thin lens at {position}, field of view {fov} degrees, {lens}{inside}"
 
 
 def _filter(rfilter: records.ReconstructionFilter) -> str:

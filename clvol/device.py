@@ -13,7 +13,7 @@ import pyopencl as cl
 
 from clvol import kernel_cache
 from clvol.device_memory import DeviceMemory
-from clvol.errors import DeviceError
+from clvol.errors import DeviceError, shown
 
 _KINDS = ("GPU", "ACCELERATOR", "CPU")
 _POCL = "Portable Computing Language"
@@ -35,7 +35,7 @@ class DeviceInfo:
     def matches(self, pattern: str) -> bool:
         """Whether `pattern` is the index, or part of the platform's or device's name (any case)."""
         text = f"{self.platform} {self.name} {self.kind}".lower()
-        return (pattern.isdigit() and int(pattern) == self.index) or pattern.lower() in text
+        return (pattern.isdecimal() and int(pattern) == self.index) or pattern.lower() in text
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +158,7 @@ def open_device(pattern: str | None = None) -> Device:
         chosen = [pair for pair in found if pair[0].matches(str(pattern))]
         if not chosen:
             names = "; ".join(f"{info.index}: {info.name} ({info.platform})" for info, _ in found)
-            raise DeviceError(f"no OpenCL device matches {pattern!r}", hint=f"there are: {names}")
+            raise DeviceError(f"no OpenCL device matches {shown(pattern)}", hint=f"there are: {names}")
     else:
         chosen = [pair for pair in found if pair[0].kind == "GPU"] or found
     return _open(chosen[0][0].index)

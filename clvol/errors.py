@@ -2,6 +2,27 @@
 
 from __future__ import annotations
 
+import sys
+
+LONGEST = 1000
+"""Characters that each part of a message has at most: of what a file or a caller gave, its ends are shown."""
+
+
+def shortened(text: str, longest: int = LONGEST) -> str:
+    """`text`, with its middle left out where it is longer than `longest`."""
+    if len(text) <= longest:
+        return text
+    head = (longest - 1) * 2 // 3
+    return f"{text[:head]}…{text[head + 1 - longest :]}"
+
+
+def shown(value: object, longest: int = 60) -> str:
+    """A caller's value for a message: its `repr`, shortened, or its type where it has none."""
+    try:
+        return shortened(repr(value), longest)
+    except Exception:  # a __repr__ that is not ours may raise anything
+        return f"a {type(value).__name__}"
+
 
 class Error(Exception):
     """Base of every error clvol raises for a user's mistake (the command line exits with 2).
@@ -16,11 +37,13 @@ class Error(Exception):
         What to do about it.
     """
 
+    longest = LONGEST
+
     def __init__(self, what: str, where: str = "", hint: str = "") -> None:
-        self.what, self.where, self.hint = what, where, hint
-        parts = [f"{where}: {what}" if where else what]
+        self.what, self.where, self.hint = (shortened(part, self.longest) for part in (what, where, hint))
+        parts = [f"{self.where}: {self.what}" if where else self.what]
         if hint:
-            parts.append(hint)
+            parts.append(self.hint)
         super().__init__("; ".join(parts))
 
 
@@ -33,7 +56,9 @@ class VolumeError(Error):
 
 
 class DeviceError(Error):
-    """No usable OpenCL device, or a kernel that does not build on it."""
+    """No usable OpenCL device, or a kernel that does not build on it (with the whole log)."""
+
+    longest = sys.maxsize
 
 
 class OptionError(Error):

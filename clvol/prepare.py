@@ -12,6 +12,7 @@ from clvol.accel import choice, controls
 from clvol.accel.bounds import Bounds, with_slack
 from clvol.accel.kdtree import KdTree, build_kdtree, pack_maximum, tree_lattice, unpack_maximum
 from clvol.boundaries import Boundaries, find_boundaries, shape_bounds
+from clvol.camera_medium import check_camera_medium
 from clvol.errors import SceneError
 from clvol.features import Features, is_clipped, is_homogeneous, medium_volumes
 from clvol.scene import records
@@ -100,11 +101,13 @@ class PreparedScene:
 def prepare(scene: records.Scene, needs: MajorantNeeds | None = None) -> PreparedScene:
     """Build brick maps, majorants and what `needs` asks of them.
 
-    Raises SceneError where a coefficient is too large for a float, or a volume is wrapped as none can be.
+    Raises SceneError where a coefficient is too large for a float, a volume is wrapped as none can be, or the
+    camera is not in the medium that it is said to be in.
     """
     needs = needs or MajorantNeeds()
     features = Features.from_scene(scene)
     found = find_boundaries(scene)
+    check_camera_medium(scene, found)
     centre, radius = _scene_sphere(scene, found)
     volumes = {}
     for medium in (entry.medium for entry in found.entries):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 from dataclasses import dataclass
 
-from clvol.errors import OptionError
+from clvol.errors import OptionError, shown
 
 
 @dataclass(frozen=True)
@@ -205,8 +205,8 @@ def check_choice(family: str, value: str, pilot: bool = False) -> str:
     `pilot`: `PILOT` is one too, where a render chooses.
     """
     choices = [*(automatic(family) if pilot else ["auto"]), *FAMILIES[family]]
-    if value in choices:
+    if isinstance(value, str) and value in choices:
         return value
-    close = difflib.get_close_matches(str(value), choices, n=1)
+    close = difflib.get_close_matches(value[:64], choices, n=1) if isinstance(value, str) else []
     guess = f"did you mean {close[0]!r}? " if close else ""
-    raise OptionError(f"unknown {family} {value!r}", hint=f"{guess}choose one of {', '.join(choices)}")
+    raise OptionError(f"unknown {family} {shown(value)}", hint=f"{guess}choose one of {', '.join(choices)}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import operator
 import signal
 import threading
@@ -14,13 +15,14 @@ from typing import TYPE_CHECKING, Any
 
 from clvol import registry
 from clvol.adaptive import TargetRender
+from clvol.arguments import check_seed, positive
 from clvol.choices import Choices
 from clvol.device import Device, open_device
-from clvol.errors import OptionError
+from clvol.errors import OptionError, shown
 from clvol.progress import Progress, ProgressCallback, RichProgress
 from clvol.result import Result
 from clvol.scene.records import Scene
-from clvol.session import MAX_SAMPLES, Session, seed_words
+from clvol.session import MAX_SAMPLES, Session
 
 if TYPE_CHECKING:
     from clvol.measure.pilot import Found
@@ -96,7 +98,7 @@ def render(
         "control": control,
         "sampler": sampler,
     }
-    piloted = technique == registry.PILOT
+    piloted = isinstance(technique, str) and technique == registry.PILOT
     if piloted:
         asked["technique"] = "auto"
     names = {family: _choice(scene, family, value) for family, value in asked.items()}
@@ -106,8 +108,7 @@ def render(
     if target_error is not None and samples is not None:
         raise OptionError("target_error and samples exclude each other", hint="spp says how many at most")
     first, count = _sample_range(scene, spp, time_limit, samples)
-    seed = scene.seed if seed is None else seed
-    seed_words(seed)  # refuses what is none, before a device is opened
+    seed = check_seed(scene.seed if seed is None else seed)
     bar = RichProgress() if progress is True else nullcontext(progress or None)
     opened = open_device(device)
     if piloted:
@@ -167,9 +168,9 @@ def _piloted(
 
 def _choice(scene: Scene, family: str, value: str) -> str:
     """The caller's choice, else the scene's, else auto."""
-    if value == "auto":
-        value = scene.integrator.choices.get(family, "auto")
-    return registry.check_choice(family, value)
+    if isinstance(value, str) and value == "auto":
+        return registry.check_choice(family, scene.integrator.choices.get(family, "auto"))
+    return registry.check_choice(family, value, pilot=True)
 
 
 def _sample_range(
@@ -178,11 +179,11 @@ def _sample_range(
     """First sample and how many; a time limit alone sets no end."""
     if samples is not None and spp is not None:
         raise OptionError("spp and samples exclude each other", hint="samples=(first, count) says both")
-    if time_limit is not None and not time_limit > 0:
-        raise OptionError(f"time limit {time_limit} is not a positive number of seconds")
+    if time_limit is not None and time_limit != math.inf:
+        positive("time limit ", time_limit, " of seconds")
     if samples is not None:
         if not isinstance(samples, tuple | list) or len(samples) != 2:
-            raise OptionError(f"samples={samples!r} is not a pair", hint="give (first, count)")
+            raise OptionError(f"samples={shown(samples)} is not a pair", hint="give (first, count)")
         first, count = samples
     elif time_limit is not None and spp is None:
         first, count = 0, MAX_SAMPLES
@@ -191,7 +192,8 @@ def _sample_range(
     try:
         first, count = operator.index(first), operator.index(count)
     except TypeError:
-        raise OptionError("numbers of samples must be whole", hint=f"not {first!r} and {count!r}") from None
+        given = f"not {shown(first)} and {shown(count)}"
+        raise OptionError("numbers of samples must be whole", hint=given) from None
     if first < 0 or count < 1 or first + count > MAX_SAMPLES:
         raise OptionError(
             f"cannot render {count} samples per pixel from sample {first} on",

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from clvol import layout, registry
+from clvol.arguments import check_seed
 from clvol.camera import camera_rays
 from clvol.choices import Choices, prepare_for, resolve
 from clvol.config import KernelConfig
 from clvol.device import Device
-from clvol.errors import OptionError
 from clvol.outcome import make_result
 from clvol.pixel_filter import FILTER_BINS
 from clvol.prepare import PreparedScene
@@ -52,7 +52,7 @@ class Session:
         cls, device: Device, scene: Scene, choices: Choices, seed: int, pool: int | None = None
     ) -> Session:
         """Prepare a scene for `choices` and open it."""
-        seed_words(seed)
+        check_seed(seed)
         started = time.perf_counter()
         prepared = prepare_for(scene, choices)
         prepared_after = time.perf_counter() - started
@@ -109,7 +109,7 @@ class Session:
             if value not in ("auto", used[family]):
                 reason = f"the scene's media need only the {used[family]} rule"
                 if used[family] == "none":
-                    reason = f"nothing in this render needs a {family}"
+                    reason = f"nothing in this render needs {'an' if family[0] in 'aeiou' else 'a'} {family}"
                 log.warning("%s %s is not used: %s", family, value, reason)
         if self.prepared.needs.scale != 1 and used["majorant"] == "none":
             log.warning("majorant_scale is not used: nothing in this render walks a majorant")
@@ -204,9 +204,8 @@ def kernel_config(prepared: PreparedScene, choices: Choices, device: Device) -> 
 
 
 def seed_words(seed: int) -> tuple[int, int]:
-    """A 64-bit seed as the device takes it: low word, high word."""
-    if not 0 <= seed < 2**64:
-        raise OptionError(f"seed {seed} is not a 64-bit number", hint="choose one from 0 to 2**64 - 1")
+    """A 64-bit seed as the device takes it: low word, high word; OptionError for what is none."""
+    seed = check_seed(seed)
     return seed & 0xFFFFFFFF, seed >> 32
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import operator
 import os
 import platform
 from collections.abc import Iterable
@@ -11,6 +9,7 @@ from contextlib import nullcontext
 
 import numpy as np
 
+from clvol.arguments import check_seed, positive, whole
 from clvol.choices import Choices
 from clvol.comparison.bar import Bar
 from clvol.comparison.combine import open_lineup
@@ -123,19 +122,14 @@ def _plan(
     """How much to render; OptionError for numbers that won't do."""
     if time_limit is not None and spp is not None:
         raise OptionError("time_limit and spp exclude each other", hint="give one of them")
-    if time_limit is not None and not 0 < time_limit < math.inf:
-        raise OptionError(f"time limit {time_limit} is not a positive number of seconds")
-    seed = scene.seed if seed is None else seed
-    least = {"rounds": LEAST_ROUNDS, "spp": 1, "reference_spp": 1, "seed": 0}
-    given = {"rounds": rounds, "spp": spp, "reference_spp": reference_spp, "seed": seed}
+    if time_limit is not None:
+        positive("time limit ", time_limit, " of seconds")
+    seed = check_seed(scene.seed if seed is None else seed)
+    least = {"rounds": LEAST_ROUNDS, "spp": 1, "reference_spp": 1}
+    given = {"rounds": rounds, "spp": spp, "reference_spp": reference_spp}
     for name, value in given.items():
-        try:
-            if value is not None and operator.index(value) < least[name]:
-                raise OptionError(f"{name}={value} is too few", hint=f"give at least {least[name]}")
-        except TypeError:
-            raise OptionError(f"{name}={value!r} is not a whole number") from None
-    if seed >= 2**64:
-        raise OptionError(f"seed {seed} is not a 64-bit number", hint="choose one from 0 to 2**64 - 1")
+        if value is not None and whole(name, value) < least[name]:
+            raise OptionError(f"{name}={value} is too few", hint=f"give at least {least[name]}")
     return Plan(rounds, time_limit or DEFAULT_SECONDS, spp, reference_spp, seed)
 
 

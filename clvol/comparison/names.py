@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterable, Mapping
 
-from clvol.errors import OptionError
+from clvol.errors import OptionError, shown
 from clvol.registry import FAMILIES, PILOT, check_choice
 
 log = logging.getLogger("clvol")
@@ -38,6 +38,8 @@ def names_asked(options: Mapping[str, str | Iterable[str]]) -> dict[str, tuple[s
 
 def split_names(family: str, value: str | Iterable[str]) -> tuple[str, ...]:
     """Names of one family, in the order given; OptionError for none, and for one that won't do here."""
+    if not isinstance(value, Iterable):
+        raise OptionError(f"{family}: {shown(value)} is not a list of names", hint="give strings")
     parts = value.split(",") if isinstance(value, str) else list(value)
     names = [name for part in parts if (name := str(part).strip())]
     if not names:

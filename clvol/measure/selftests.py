@@ -12,12 +12,14 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from numbers import Real
 
 import numpy as np
 
+from clvol.arguments import check_seed, positive, whole
 from clvol.choices import Choices
 from clvol.device import Device, open_device
-from clvol.errors import OptionError
+from clvol.errors import OptionError, shown
 from clvol.features import Features
 from clvol.measure.combinations import (
     LIGHTS,
@@ -184,10 +186,13 @@ def selftest(
     """
     if not isinstance(scene, Scene):
         raise OptionError(f"selftest takes a Scene, not {type(scene).__name__}", hint="use load_file")
-    if not 0 < alpha < 1:
-        raise OptionError(f"alpha {alpha} is no probability", hint="give a small one, such as 1e-4")
-    if seconds is not None and not 0 < seconds < math.inf:
-        raise OptionError(f"{seconds} is not a positive number of seconds")
+    if not isinstance(alpha, Real) or not 0 < alpha < 1:
+        raise OptionError(f"alpha {shown(alpha)} is no probability", hint="give a small one, such as 1e-4")
+    if seconds is not None:
+        positive("", seconds, " of seconds")
+    seed = check_seed(seed)
+    if spp is not None and whole("spp", spp) < 1:
+        raise OptionError(f"spp={spp} is too few", hint="give at least 1")
     effort = QUICK if quick else FULL
     tell = progress or (lambda what, done, total: None)
     small, opened = reduced(scene, effort.pixels), open_device(device)

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from clvol import registry
+from clvol.arguments import check_seed, whole
 from clvol.choices import Choices
 from clvol.comparison.names import split_names
 from clvol.device import open_device
-from clvol.errors import OptionError
+from clvol.errors import OptionError, shown
 from clvol.features import is_homogeneous
 from clvol.ray.kernels import RayKernels
 from clvol.ray.place import Place, find_places, pixel_hint
@@ -69,6 +70,7 @@ def trace_ray(
         raise OptionError(
             f"trace_ray takes a Scene, not {type(scene).__name__}", hint="make one with load_file"
         )
+    x, y, walks, many = (whole(*given) for given in (("x", x), ("y", y), ("walks", walks), ("many", many)))
     if not 1 <= walks <= MOST_SHOWN or not max(walks, 2) <= many <= 1 << 24:
         raise OptionError(f"cannot show {walks} of {many} walks", hint=f"show 1 to {MOST_SHOWN}")
     known = {*registry.FAMILIES, "majorant_scale", "step"} - {"technique", "transmittance"}
@@ -82,7 +84,7 @@ def trace_ray(
         raise OptionError("step is for ray marching, and nothing marches here", hint="name marching too")
     if "none" in asked:
         raise OptionError("transmittance 'none' estimates nothing to show", hint="leave it out")
-    seed, opened = scene.seed if seed is None else seed, open_device(device)
+    seed, opened = check_seed(scene.seed if seed is None else seed), open_device(device)
     tell = progress or (lambda done, total, what: None)
     tell(0, 1, "the ray")
     first = {"technique": techniques[0]} if techniques else {}
@@ -176,7 +178,7 @@ def _channel(sigma_t: np.ndarray, channel: int | None) -> int:
     if channel is None or len(sigma_t) == 1:
         return int(sigma_t.sum(axis=1, dtype=np.float64).argmax())
     if channel not in range(3):
-        raise OptionError(f"no channel {channel!r}", hint="0, 1 and 2 are red, green and blue")
+        raise OptionError(f"no channel {shown(channel)}", hint="0, 1 and 2 are red, green and blue")
     return channel
 
 

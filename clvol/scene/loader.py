@@ -131,7 +131,7 @@ def _build(root: Node, source: str) -> Scene:
     return Scene(
         sensor=camera.camera,
         film=camera.film,
-        integrator=_integrator(records["integrator"], [record for _, record in records["shape"]]),
+        integrator=_integrator(records["integrator"], _what_has_media(camera, records["shape"])),
         shapes=tuple(record for _, record in records["shape"]),
         emitters=tuple(record for _, record in records["emitter"]),
         spp=camera.sampler.spp,
@@ -166,18 +166,26 @@ def _check_emitters(emitters: list[tuple[Node, object]]) -> None:
             )
 
 
-def _integrator(integrators: list[tuple[Node, integrator.Chosen]], shapes: list[Shape]) -> Integrator:
+def _what_has_media(camera: sensor.Sensor, shapes: list[tuple[Node, Shape]]) -> str:
+    """The first thing in the scene that names a medium, "" without."""
+    if camera.camera.medium is not None:
+        return "sensor"
+    for _, record in shapes:
+        if record.interior or record.exterior:
+            return f"shape '{record.name}'" if record.name else "shape"
+    return ""
+
+
+def _integrator(integrators: list[tuple[Node, integrator.Chosen]], with_media: str) -> Integrator:
     """The one integrator, which must see the scene's media if there are any."""
     if not integrators:
         return Integrator()
     if len(integrators) > 1:
         raise SceneError("a scene takes one integrator, this is the second", integrators[1][0].where)
     node, chosen = integrators[0]
-    bounds = [shape for shape in shapes if shape.interior or shape.exterior]
-    if bounds and not chosen.media:
-        name = f" (shape '{bounds[0].name}')" if bounds[0].name else ""
+    if with_media and not chosen.media:
         raise SceneError(
-            f"integrator '{chosen.name}' sees no media, and the scene has some{name}",
+            f"integrator '{chosen.name}' sees no media, and the scene has some ({with_media})",
             node.where,
             "use volpath",
         )

@@ -65,6 +65,7 @@ class Perspective:
 
     `fov` in degrees is along `fov_axis`: "x", "y", "diagonal", "smaller" or "larger".
     `principal_point_offset` is relative to the film size, as in Mitsuba.
+    `medium`: what the scene says the camera is in; what shapes hold round it is found without.
     """
 
     to_world: np.ndarray
@@ -75,6 +76,7 @@ class Perspective:
     principal_point_offset: tuple[float, float] = (0.0, 0.0)
     aperture_radius: float = 0.0
     focus_distance: float = 1.0
+    medium: Medium | None = None
 
 
 @dataclass(frozen=True, eq=False)

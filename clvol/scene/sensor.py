@@ -66,11 +66,9 @@ def _pinhole(reader: Reader) -> Perspective:
 def _sensor(reader: Reader, camera: Perspective) -> Sensor:
     """`camera` with the film and sampler inside the sensor."""
     film_node, sampler_node = reader.only_child("film"), reader.only_child("sampler")
-    # The medium round the camera is found from the shapes; naming it, as Mitsuba needs, is checked only.
-    for _, medium in reader.children("medium"):
-        reader.build.build(medium)
+    medium = reader.only_child("medium")
     return Sensor(
-        camera,
+        replace(camera, medium=reader.build.build(medium) if medium else None),
         reader.build.build(film_node) if film_node else Film(),
         reader.build.build(sampler_node) if sampler_node else Sampler(),
     )
