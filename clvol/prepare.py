@@ -199,7 +199,19 @@ def _choose_majorants(
         least = costs[chosen] or 1.0
         relative = ", ".join(f"{name} {cost / least:.2f}" for name, cost in costs.items())
         log.info("majorant %s: expected cost per ray relative to it: %s", chosen, relative)
-    return chosen, {id(m): _tables(c, chosen, needs) for m, c in zip(media, found[chosen], strict=True)}
+    return chosen, {
+        id(m): _tables(c, chosen, needs, _longest(m, volumes[id(m.sigma_t)]))
+        for m, c in zip(media, found[chosen], strict=True)
+    }
+
+
+def _longest(medium: records.Medium, volume: PreparedVolume) -> np.ndarray:
+    """Optical depth that the longest way through the volume's box has at density 1, float64 (channels of the
+    volume,)."""
+    edges = np.linalg.inv(volume.world_to_index)[:3, :3] * volume.bricks.size
+    scale = np.array(medium.scale, np.float64)
+    own = scale if volume.bricks.channels == len(scale) else scale.max()
+    return np.broadcast_to(np.linalg.norm(edges) * own, volume.bricks.channels)
 
 
 def _check_range(medium: records.Medium, volume: PreparedVolume, needs: MajorantNeeds) -> None:
@@ -235,8 +247,8 @@ def _candidate(
     return _Candidate(bounds, None, choice.global_cost(bounds, extent * bounds.cell_size, rate, *technique))
 
 
-def _tables(candidate: _Candidate, kind: str, needs: MajorantNeeds) -> PreparedMajorant:
-    """What the device reads of a majorant's cells, row by row."""
+def _tables(candidate: _Candidate, kind: str, needs: MajorantNeeds, longest: np.ndarray) -> PreparedMajorant:
+    """What the device reads of a majorant's cells, row by row; `longest` limits controls."""
     bounds, tree, _ = candidate
     found = tree or (bounds.whole() if kind == "global" else bounds)
     channels = found.maximum.shape[-1]
@@ -249,9 +261,9 @@ def _tables(candidate: _Candidate, kind: str, needs: MajorantNeeds) -> PreparedM
         majorant = unpack_maximum(pack_maximum(majorant))
     control = residual = None
     if needs.control != "none":
-        control = controls.control(*extrema, needs.control, needs.scale)
+        control = controls.control(*extrema, needs.control, needs.scale, longest)
     if needs.residual != "none":
-        chosen, residual_majorant = controls.residual(*extrema, needs.residual, needs.scale)
+        chosen, residual_majorant = controls.residual(*extrema, needs.residual, needs.scale, longest)
         residual = np.column_stack([chosen, residual_majorant])
     nodes = tree.nodes if tree else None
     return PreparedMajorant(bounds.cells, bounds.cell_size, nodes, majorant, control, residual)

@@ -130,9 +130,9 @@ PROBABILITIES = {
     "max": Choice("events in proportion to the largest coefficient of the channels"),
 }
 CONTROLS = {
-    "mean": Choice("the mean density of each majorant cell"),
+    "mean": Choice("the mean density of each majorant cell, less where thick cells may have gaps"),
     "min": Choice("the least density of each majorant cell"),
-    "max": Choice("the greatest density of each majorant cell"),
+    "max": Choice("the greatest density of each majorant cell, with the same limit"),
 }
 SAMPLERS = {
     "independent": Choice("every number independent of all others", "core/independent.h"),

@@ -22,7 +22,10 @@ COLOURED = GREY[..., None] * [1.0, 0.5, 0.1] + RNG.random((37, 41, 33, 1)) * 0.0
 KINDS = ["global", "grid", "kdtree"]
 
 
-def prepared(values, medium_scale=500.0, **needs):
+MEDIUM_SCALE = 500.0
+
+
+def prepared(values, medium_scale=MEDIUM_SCALE, **needs):
     medium = medium_of(values, medium_scale, 0.5)
     scene = scene_of(medium)
     found = prepare(scene, MajorantNeeds(**needs))
@@ -72,8 +75,10 @@ def test_every_row_holds_the_bound_and_the_controls_of_its_cell(values, kind, sc
         bound = unpack_maximum(pack_maximum(bound))
         assert len(bound) > 4
     assert found.majorant.dtype == np.float32 and (found.majorant == bound).all()
-    assert np.allclose(found.control, controls.control(low, high, mean, "fitted", scale), rtol=1e-5)
-    chosen, majorant = controls.residual(low, high, mean, "mean", scale)
+    longest = np.full(low.shape[-1], MEDIUM_SCALE * np.sqrt(3))
+    subtracted = controls.control(low, high, mean, "fitted", scale, longest)
+    assert np.allclose(found.control, subtracted, rtol=1e-5)
+    chosen, majorant = controls.residual(low, high, mean, "mean", scale, longest)
     assert found.residual.dtype == found.control.dtype == np.float32
     assert np.allclose(found.residual, np.column_stack([chosen, majorant]), rtol=1e-4)
     assert (found.control <= found.majorant[:, None]).all()
@@ -98,9 +103,17 @@ def test_the_minimum_is_subtracted_as_it_is_and_bounds_the_residual():
 def test_tables_are_in_the_units_of_the_volume_whatever_the_medium_scales():
     needs = {"majorant": "global", "control": "fitted", "residual": "mean"}
     _, thin = prepared(COLOURED, 0.01, **needs)
-    _, thick = prepared(COLOURED, (400.0, 1.0, 7.0), **needs)
+    _, thicker = prepared(COLOURED, (4.0, 0.1, 0.7), **needs)
     for name in ("majorant", "control", "residual"):
-        assert (getattr(thin, name) == getattr(thick, name)).all()
+        assert (getattr(thin, name) == getattr(thicker, name)).all()
+
+
+def test_controls_are_nearer_the_minimum_where_the_medium_is_thick():
+    needs = {"majorant": "global", "control": "fitted", "residual": "mean"}
+    _, thin = prepared(COLOURED, 1.0, **needs)
+    _, thick = prepared(COLOURED, 1e4, **needs)
+    assert (thick.majorant == thin.majorant).all()
+    assert (thick.control < thin.control).all() and (thick.residual[:, :-1] < thin.residual[:, :-1]).all()
 
 
 @pytest.mark.parametrize("control", ["none", "min", "fitted"])
