@@ -68,9 +68,9 @@ def control(
     the mean density (the worst is a density that knows only its extrema); (minimum + sigma_maj) / 2, which
     keeps each factor within 3; and 0.9 sigma_maj, since at c = sigma_maj the events of the residual would
     have probability 0 and coefficients that are not, which is bias (METHODS §3), also where
-    `majorant_scale` < 1 breaks the bound.  Where `longest`, float64 (channels,), gives the optical depth at density 1 of the
-    longest way through the medium, c exceeds the minimum by no more than LONGEST_GROWTH allows there.
-    Where a cell is constant the residual is rounding, which the gap left by `with_slack` covers, and the
+    `majorant_scale` < 1 breaks the bound.  Where `longest`, float64 (channels,), gives the optical depth at
+    density 1 of the longest way through the medium, c exceeds the minimum by no more than LONGEST_GROWTH
+    allows there.  Where a cell is constant the residual is rounding, which the gap left by `with_slack` covers, and the
     mean itself saves every look-up but those that hit the gap.
     """
     if kind == "none":
