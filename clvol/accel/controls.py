@@ -70,8 +70,8 @@ def control(
     have probability 0 and coefficients that are not, which is bias (METHODS §3), also where
     `majorant_scale` < 1 breaks the bound.  Where `longest`, float64 (channels,), gives the optical depth at
     density 1 of the longest way through the medium, c exceeds the minimum by no more than LONGEST_GROWTH
-    allows there.  Where a cell is constant the residual is rounding, which the gap left by `with_slack` covers, and the
-    mean itself saves every look-up but those that hit the gap.
+    allows there.  Where a cell is constant the residual is rounding, which the gap left by
+    `with_slack` covers, and the mean itself saves every look-up but those that hit the gap.
     """
     if kind == "none":
         return np.zeros_like(minimum)
