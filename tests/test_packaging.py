@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import tarfile
 import zipfile
 from pathlib import Path
 
@@ -104,3 +105,28 @@ def test_editable_install_reads_the_kernels_of_its_checkout(source: Path, tmp_pa
     pip("install", "--no-deps", "--target", site, "--editable", source)
     assert not (site / "clvol").exists()
     assert compose(elsewhere, site) == source / "clvol" / "__init__.py"
+
+
+def test_source_distribution_holds_what_its_tests_need(tmp_path: Path) -> None:
+    checkout = tmp_path / "checkout"
+    left_out = shutil.ignore_patterns(
+        ".git", ".venv", ".lowest", "build", "*.egg-info", "__pycache__", ".*_cache"
+    )
+    shutil.copytree(ROOT, checkout, ignore=left_out)
+    command = [sys.executable, "-m", "build", "--sdist", "--outdir", str(tmp_path), str(checkout)]
+    outcome = subprocess.run(command, capture_output=True, text=True)
+    assert outcome.returncode == 0, outcome.stderr
+    [path] = tmp_path.glob("*.tar.gz")
+    with tarfile.open(path) as archive:
+        found = {name.partition("/")[2] for name in archive.getnames()}
+    for folder in ("clvol", "cl", "scenes", "tests", "tools", "docs"):
+        files = [p for p in (ROOT / folder).rglob("*") if p.is_file() and p.suffix != ".pyc"]
+        missing = {p.relative_to(ROOT).as_posix() for p in files} - found
+        assert files and not missing
+
+
+def test_every_dependency_has_a_lower_bound_that_can_be_asked_for() -> None:
+    command = [sys.executable, str(ROOT / "tools" / "lowest.py")]
+    outcome = subprocess.run(command, capture_output=True, text=True)
+    assert outcome.returncode == 0, outcome.stderr
+    assert "numpy==2.0" in outcome.stdout.splitlines()
