@@ -6,7 +6,7 @@ Heavy modules are imported where they are used.
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,7 +29,6 @@ from clvol.cli_options import (
 )
 from clvol.cli_ray import ray
 from clvol.cli_selftest import selftest
-from clvol.errors import Error
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -140,20 +139,23 @@ def render(
     """
     from rich.console import Console
 
-    from clvol import image_io
     from clvol.progress import RichProgress
+    from clvol.saving import check_disk, check_picture, save_all
 
     if spp is not None and time_limit is not None:
         raise click.UsageError("give --spp or --time, not both")
     for output in outputs:
-        image_io.check_output(output)
-    if options["aov"] and not any(image_io.output_suffix(output) == ".exr" for output in outputs):
+        check_picture(output, exposure)
+    if options["aov"] and not any(output.lower().endswith(".exr") for output in outputs):
         raise click.UsageError("--aov needs an .exr to write to")
     console = Console(stderr=True)
     with _logging_to(console, verbose):
         import clvol
 
         loaded = clvol.load_file(scene, **dict(definitions))
+        pixels = loaded.film.window[2] * loaded.film.window[3]
+        for output in outputs:
+            check_disk(output, pixels, len(options["aov"]))
         piloted = options["technique"] == "auto:pilot"
         if piloted and not quiet and not console.is_terminal:
             from clvol.measure.repeat import announcement
@@ -165,26 +167,16 @@ def render(
             from clvol.measure.repeat import with_definitions
 
             result.metadata["repeat"] = with_definitions(result.metadata["repeat"], dict(definitions))
-        failures = _save_all(result, outputs, exposure)
+        failures = save_all(result, outputs, exposure)
     interrupted = bool(result.stats.get("interrupted"))
     if interrupted:
         click.echo(f"clvol: interrupted after {result.samples[1]} spp, saved what there is", err=True)
     if not quiet:
-        click.echo("\n".join(_summary(result, outputs)))
-    for failure in failures:
+        written = [output for output in outputs if output not in failures]
+        click.echo("\n".join(_summary(result, written)))
+    for failure in failures.values():
         raise failure
     click.get_current_context().exit(INTERRUPTED if interrupted else 0)
-
-
-def _save_all(result: Result, outputs: tuple[str, ...], exposure: float) -> list[Error]:
-    """Write every picture that can be written; return what went wrong with the others."""
-    failures = []
-    for output in outputs:
-        try:
-            result.save(output, exposure=exposure)
-        except Error as error:
-            failures.append(error)
-    return failures
 
 
 @contextmanager
@@ -209,7 +201,7 @@ def _logging_to(console: Console, verbose: bool) -> Iterator[None]:
         logger.setLevel(earlier)
 
 
-def _summary(result: Result, outputs: tuple[str, ...]) -> Iterator[str]:
+def _summary(result: Result, written: Sequence[str]) -> Iterator[str]:
     """What was written, what it cost and how sure it is."""
     from clvol.progress import format_noise
 
@@ -218,7 +210,7 @@ def _summary(result: Result, outputs: tuple[str, ...]) -> Iterator[str]:
     seconds = about["seconds"]
     rate = width * height * count / max(seconds, 1e-9)
     mean = " on the mean" if "target_error" in about else ""
-    yield f"{', '.join(outputs)}: {width} x {height} pixels, {count} spp{mean}"
+    yield f"{', '.join(written) or 'not saved'}: {width} x {height} pixels, {count} spp{mean}"
     yield f"  {seconds:.2f} s, {rate:,.0f} samples/s, noise {format_noise(result.noise)}"
     choices = ("technique", "transmittance", "majorant", "lookup")
     used = [f"{key} {about[key]}" for key in choices if about[key] != "none" or key == "transmittance"]

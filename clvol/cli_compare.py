@@ -115,7 +115,7 @@ def compare(
     from rich.console import Console
 
     from clvol.comparison.bar import Bar
-    from clvol.comparison.report import check_folder
+    from clvol.comparison.report import check_folder, write_or_keep
 
     if options["spp"] is not None and options["time_limit"] is not None:
         raise click.UsageError("give --spp or --time, not both")
@@ -133,7 +133,7 @@ def compare(
         comparison = _run(clvol.compare, loaded, progress, options)
         arguments = click.get_current_context().meta.get("clvol.arguments", [])
         comparison.about["command"] = shlex.join(["clvol", "compare", *arguments])
-        comparison.save(output)
+        write_or_keep(comparison, output)
     if comparison.interrupted:
         click.echo(
             f"clvol: interrupted after {comparison.about['rounds']} rounds, saved what there is", err=True

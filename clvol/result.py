@@ -125,15 +125,9 @@ class Result:
 
     def _repr_png_(self) -> bytes:
         """The picture as a PNG, tone-mapped: how a notebook shows a result."""
-        import tempfile
-        from pathlib import Path
+        from clvol.saving import encode
 
-        from clvol import image_io
-
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder, "result.png")
-            image_io.write_png(path, self.image, self.metadata)
-            return path.read_bytes()
+        return encode(self, ".png")
 
     def save(self, path: str | PathLike[str], exposure: float = 0.0) -> None:
         """Write the picture as .exr (everything, linear) or .png (tone-mapped), by the path's suffix.
@@ -145,19 +139,14 @@ class Result:
         Raises
         ------
         OptionError
-            Unknown suffix, or a folder that is missing or cannot be written to.
+            Unknown suffix, impossible exposure, or a folder that is missing or cannot be written to; or a
+            file that failed, as on a full disk: the picture is then kept where the message says.
         """
-        from clvol import image_io
+        from clvol.saving import check_picture, save_all
 
-        if image_io.output_suffix(path) == ".png":
-            image_io.write_png(path, self.image, self.metadata, exposure)
-        else:
-            channels = image_io.split_channels("", self.image) | image_io.split_channels(
-                "variance", self.variance
-            )
-            for name, plane in self.aovs.items():
-                channels |= image_io.split_channels(name, plane)
-            image_io.write_exr(path, channels, self.metadata | {"dof": self.dof})
+        check_picture(path, exposure)
+        for failure in save_all(self, [path], exposure).values():
+            raise failure
 
 
 def merge(results: Iterable[Result]) -> Result:

@@ -26,8 +26,9 @@ from clvol.comparison.report import as_json, check_folder, write_report
 from clvol.comparison.shorter import render_slope, shorter_spp
 from clvol.comparison.words import _slope, text_table
 from clvol.errors import OptionError
-from clvol.image_io import split_channels, write_exr
+from clvol.image_io import encode_exr, split_channels
 from clvol.measure.efficiency import Interval
+from clvol.output_files import write_file
 from clvol.registry import FAMILIES
 from clvol.sobol import RANDOMIZATIONS
 
@@ -250,7 +251,7 @@ def test_rare_bright_samples_are_no_bias_against_a_given_reference(tmp_path: Pat
     truth = Reference.of_rounds(rounds, spp, "made up")
     path = tmp_path / "reference.exr"
     channels = split_channels("", truth.image) | split_channels("variance", truth.variance)
-    write_exr(path, channels, {"spp": truth.spp, "dof": 15})
+    write_file(path, encode_exr(channels, {"spp": truth.spp, "dof": 15}))
     given = read_reference(path, scene)
     assert given.round_spp == spp
     alarms = {name: 0 for name in ("as it is", "samples unknown")}
@@ -338,16 +339,18 @@ def test_a_reference_without_variance_is_used_with_a_warning(
     scene = clvol.load_file(str(scene_file))
     image, variance = np.ones((SIZE, SIZE, 3)), np.full((SIZE, SIZE, 3), 0.25)
     plain, full = tmp_path / "plain.exr", tmp_path / "full.exr"
-    write_exr(plain, split_channels("", image), {"digest": "another", "biased": "technique marching"})
+    write_file(
+        plain, encode_exr(split_channels("", image), {"digest": "another", "biased": "technique marching"})
+    )
     channels = split_channels("", image) | split_channels("variance", variance)
-    write_exr(full, channels, {"seeds": "4 9", "spp": 64})
+    write_file(full, encode_exr(channels, {"seeds": "4 9", "spp": 64}))
     found = read_reference(full, scene)
     assert found.variance_known and found.seeds == (4, 9) and not caplog.records
     np.testing.assert_allclose(found.rounds.mean(axis=0), image, rtol=1e-5)
     np.testing.assert_allclose(found.rounds.var(axis=0, ddof=1) / len(found.rounds), variance, rtol=1e-4)
     assert not read_reference(plain, scene).variance_known
     assert len(caplog.records) == 3  # no variance, another scene, biased itself
-    write_exr(plain, split_channels("", image[:8]), {})
+    write_file(plain, encode_exr(split_channels("", image[:8]), {}))
     for path, message in (
         (plain, "16 x 8"),
         (tmp_path / "none.exr", "no such file"),

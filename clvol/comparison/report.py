@@ -26,7 +26,6 @@ import json
 import os
 import secrets
 import shutil
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +37,7 @@ from clvol.comparison.html import html_report
 from clvol.comparison.plots import plots
 from clvol.comparison.words import sentences
 from clvol.errors import OptionError
+from clvol.output_files import check_room, kept_elsewhere, new_file, real, sync_folder
 
 KIND = "clvol compare"
 _JSON, _HTML, _REFERENCE = "report.json", "report.html", "reference.exr"
@@ -45,11 +45,9 @@ _JSON, _HTML, _REFERENCE = "report.json", "report.html", "reference.exr"
 
 def check_folder(folder: str | os.PathLike[str]) -> None:
     """Raise OptionError now for a folder that `write_report` could not or should not replace later."""
-    where, target = os.fspath(folder), _real(folder)
+    where, target = os.fspath(folder), real(folder)
     if target.exists() and not target.is_dir():
         raise OptionError("is a file, and a report is a folder", where=where)
-    if not target.parent.is_dir():
-        raise OptionError(f"no such folder '{target.parent}'", where=where, hint="make it first")
     if target.is_dir():
         foreign = sorted({p.name for p in target.iterdir()} - _own_files(target))
         if foreign:
@@ -58,40 +56,61 @@ def check_folder(folder: str | os.PathLike[str]) -> None:
                 where=where,
                 hint="take another folder",
             )
-    try:  # the only sure way to know
-        with tempfile.TemporaryDirectory(dir=target.parent, prefix=".report."):
-            pass
-    except OSError as error:
-        raise OptionError(f"cannot write to '{target.parent}': {error.strerror}", where=where) from None
+    check_room(target.parent, where)
 
 
 def write_report(comparison: Comparison, folder: str | os.PathLike[str]) -> None:
     """Write the folder; an earlier report of that name is replaced once the new one is complete.
 
-    OptionError as `check_folder` says, and where writing fails.
+    OptionError as `check_folder` says, and as `write_or_keep`.
     """
     check_folder(folder)
-    target = _real(folder)
-    made = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
+    write_or_keep(comparison, folder)
+
+
+def write_or_keep(comparison: Comparison, folder: str | os.PathLike[str]) -> None:
+    """Write the folder, or, where that fails, as on a full disk, another one; OptionError then says which."""
+    files = _files(comparison)
+    try:
+        check_folder(folder)
+        _replace(real(folder), files)
+    except (OSError, OptionError) as error:
+        name = f"clvol-report-{secrets.token_hex(4)}"
+        kept = kept_elsewhere(folder, name, lambda place: _write_new(place, files))
+        hint = f"the report is kept as {kept}" if kept else "and there is no other place to keep the report"
+        what = error.what if isinstance(error, OptionError) else f"cannot be written: {error.strerror}"
+        raise OptionError(what, os.fspath(folder), hint) from error
+
+
+def _replace(target: Path, files: dict[str, bytes]) -> None:
+    """The folder with these files and no others; as it was where that fails, with OSError."""
+    made = target.with_name(f".clvol-{secrets.token_hex(4)}")
     old = made.with_name(made.name + ".old")
     try:
-        made.mkdir()
-        _fill(comparison, made)
+        _write_new(made, files)
         if target.exists():
+            shutil.copymode(target, made)
             target.rename(old)
         made.rename(target)
-    except OSError as error:
+        sync_folder(target.parent)
+    finally:
         if old.exists() and not target.exists():
             old.rename(target)
-        raise OptionError(f"cannot write the report: {error.strerror}", where=os.fspath(folder)) from error
-    finally:
         shutil.rmtree(made, ignore_errors=True)
-        if target.exists():
-            shutil.rmtree(old, ignore_errors=True)
+        shutil.rmtree(old, ignore_errors=True)
 
 
-def _real(folder: str | os.PathLike[str]) -> Path:
-    return Path(os.path.realpath(folder))
+def _write_new(folder: Path, files: dict[str, bytes]) -> None:
+    """A folder that was not there; nothing where that fails, with OSError."""
+    try:
+        folder.mkdir()
+        for name, data in files.items():
+            with new_file(folder / name) as file:
+                file.write(data)
+        sync_folder(folder)
+    except OSError:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
 
 
 def _own_files(folder: Path) -> set[str]:
@@ -103,19 +122,18 @@ def _own_files(folder: Path) -> set[str]:
         return set()
 
 
-def _fill(comparison: Comparison, folder: Path) -> None:
+def _files(comparison: Comparison) -> dict[str, bytes]:
+    """What is in the folder, by name."""
     drawn = plots(comparison)
-    for name, png in drawn.items():
-        (folder / f"{name}.png").write_bytes(png)
-    (folder / _HTML).write_text(html_report(comparison, drawn), encoding="utf-8")
+    files = {f"{name}.png": png for name, png in drawn.items()}
+    files[_HTML] = html_report(comparison, drawn).encode("utf-8", "backslashreplace")
     reference = comparison.reference
     channels = image_io.split_channels("", reference.image)
     if reference.variance_known:
         channels |= image_io.split_channels("variance", reference.variance)
-    image_io.write_exr(folder / _REFERENCE, channels, _reference_metadata(comparison))
-    files = sorted(path.name for path in folder.iterdir())
-    text = json.dumps(as_json(comparison) | {"files": files}, indent=1, allow_nan=False)
-    (folder / _JSON).write_text(text + "\n", encoding="utf-8")
+    files[_REFERENCE] = image_io.encode_exr(channels, _reference_metadata(comparison))
+    text = json.dumps(as_json(comparison) | {"files": sorted(files)}, indent=1, allow_nan=False)
+    return files | {_JSON: (text + "\n").encode()}
 
 
 def _reference_metadata(comparison: Comparison) -> dict[str, Any]:

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import secrets
-import tempfile
 from dataclasses import asdict, dataclass
 from os import PathLike
 from pathlib import Path
@@ -13,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clvol.errors import OptionError
+from clvol.output_files import check_file, output_suffix, write_file
 from clvol.ray.place import Place
 from clvol.ray.walks import Watched, format_estimate
 from clvol.version import __version__
@@ -168,48 +165,27 @@ class RayView:
         only once the new one is complete.
         """
         check_output(path)
-        target = Path(os.path.realpath(path))
-        temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
-        try:
-            if target.suffix.lower() == ".json":
-                temporary.write_text(json.dumps(_finite(self.to_dict()), indent=1) + "\n", encoding="utf-8")
-            else:
-                self.figure().savefig(temporary, dpi=150)
-            os.replace(temporary, target)
-        except OSError as error:
-            raise OptionError(f"cannot write the picture: {error.strerror}", where=str(path)) from error
-        finally:
-            temporary.unlink(missing_ok=True)
+        write_file(path, self._encoded(Path(path).suffix.lower()[1:], 150))
+
+    def _encoded(self, kind: str, dpi: int) -> bytes:
+        """The numbers as JSON, or the figure in a format of matplotlib's."""
+        import io
+
+        if kind == "json":
+            return (json.dumps(_finite(self.to_dict()), indent=1) + "\n").encode()
+        buffer = io.BytesIO()
+        self.figure().savefig(buffer, format=kind, dpi=dpi)
+        return buffer.getvalue()
 
     def _repr_png_(self) -> bytes:
         """The figure, for notebooks."""
-        import io
-
-        buffer = io.BytesIO()
-        self.figure().savefig(buffer, format="png", dpi=100)
-        return buffer.getvalue()
+        return self._encoded("png", 100)
 
 
 def check_output(path: str | PathLike[str]) -> None:
     """Raise OptionError now for a path that `RayView.save` could not write later."""
-    suffix = Path(path).suffix.lower()
-    if suffix not in SUFFIXES:
-        raise OptionError(
-            f"unknown format '{suffix}'" if suffix else "no format",
-            where=str(path),
-            hint=f"name the file {', '.join(SUFFIXES)}",
-        )
-    target = Path(os.path.realpath(path))
-    if target.is_dir():
-        raise OptionError("is a folder, not a file", where=str(path), hint="give a file name")
-    if not target.parent.is_dir():
-        raise OptionError(f"no such folder '{target.parent}'", where=str(path), hint="make it first")
-    try:
-        with tempfile.TemporaryFile(dir=target.parent):
-            pass
-    except OSError as error:
-        reason = f"cannot write to '{target.parent}': {error.strerror}"
-        raise OptionError(reason, where=str(path), hint="choose another folder") from None
+    output_suffix(path, SUFFIXES)
+    check_file(path)
 
 
 def _finite(value: Any) -> Any:

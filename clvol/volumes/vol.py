@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from clvol.errors import VolumeError
+from clvol.output_files import replacing
 from clvol.volumes.files import TRUNCATED, open_binary
 from clvol.volumes.grid import DenseGrid
 
@@ -67,7 +68,7 @@ def write_vol(path: str | os.PathLike[str], values: np.ndarray, box: np.ndarray)
     values : real array (nz, ny, nx) or (nz, ny, nx, channels) with 1 or 3 channels; stored as float32.
     box : (2, 3), lower and upper corner in x, y, z order, used by Mitsuba with use_grid_bbox = true.
 
-    Raises VolumeError for other shapes and an empty box.
+    Raises VolumeError for other shapes and an empty box, OptionError where the file cannot be written.
     """
     where = str(path)
     values = np.asarray(values)
@@ -79,7 +80,7 @@ def write_vol(path: str | os.PathLike[str], values: np.ndarray, box: np.ndarray)
     if box.shape != (2, 3) or not np.isfinite(box).all() or not (box[0] < box[1]).all():
         raise VolumeError(f"box {box.tolist()} is no lower and upper corner", where)
     nz, ny, nx, channels = values.shape
-    with open(path, "wb") as file:
+    with replacing(path) as file:
         file.write(HEADER.pack(b"VOL", VERSION, FLOAT32, nx, ny, nz, channels, *box.ravel()))
         for z in range(nz):
             file.write(np.ascontiguousarray(values[z], "<f4").data)
