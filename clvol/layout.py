@@ -84,7 +84,8 @@ EMITTER = _record(
     ("shape", "i", 1),  # of an area light
     ("area", "f", 1),
     ("first", "i", 1),  # of a mesh's entries in `light_faces` and `light_cdf`
-    ("count", "i", 1),
+    ("primitive", "u", 1),  # first primitive of an area light
+    ("count", "u", 1),  # of its primitives, which follow each other
 )
 
 SHAPE = _record(
@@ -282,6 +283,7 @@ def path_fields(config: KernelConfig) -> list[PathField]:
         PathField("shadow_y", "f", "direction to the light", config.nee),
         PathField("shadow_z", "f", "direction to the light", config.nee),
         PathField("shadow_distance", "f", "distance to the light", config.nee and features.near_lights),
+        PathField("shadow_primitive", "u", "primitive of the light's point", config.nee and features.area),
         *(
             PathField(
                 f"shadow_origin_{axis}", "f", "start of the shadow ray", config.nee and features.surfaces > 0

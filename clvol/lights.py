@@ -71,7 +71,9 @@ def light_table(
         power[i] = _describe_emitter(table[i], emitter, centre, radius)
     faces, cdf = [np.zeros(0, np.uint32)], [np.zeros(0, np.float32)]
     for i, number in enumerate(shining, len(emitters)):
-        if shapes[number].kind not in QUADRICS:
+        if shapes[number].kind in QUADRICS:
+            table[i]["primitive"], table[i]["count"] = quadric_primitive(surfaces, number), 1
+        else:
             table[i]["first"] = sum(map(len, faces))
             for arrays, run in zip((faces, cdf), mesh_run(surfaces, number, table[i]), strict=True):
                 arrays.append(run)
@@ -106,13 +108,19 @@ def selection(power: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def mesh_run(surfaces: Surfaces, number: int, record: np.void) -> tuple[np.ndarray, np.ndarray]:
-    """A shape's entries of `LightTable.faces` and `.cdf`; writes their count and area into the record."""
+    """A shape's entries of `LightTable.faces` and `.cdf`; writes its triangles and area into the record."""
     members = np.flatnonzero(surfaces.faces[:, 3] == number)
     a, b, c = (surfaces.vertices[surfaces.faces[members, k]].astype(np.float64) for k in range(3))
     area = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)])
     record["count"], record["area"] = len(members), area[-1]
+    record["primitive"] = members[0] if len(members) else 0
     cdf = area / area[-1] if area[-1] > 0 else np.append(0.0, np.ones(len(members)))
     return np.append(members, 0).astype(np.uint32), cdf.astype(np.float32)
+
+
+def quadric_primitive(surfaces: Surfaces, number: int) -> int:
+    """Number of a shape's primitive: quadrics follow all triangles, in the order of their shapes."""
+    return len(surfaces.faces) + sum(shape.kind in QUADRICS for shape in surfaces.shapes[:number])
 
 
 def quadric_area(shape: records.Shape) -> float:

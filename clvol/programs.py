@@ -106,6 +106,8 @@ def geometry_headers(config: KernelConfig, stage: str) -> list[str]:
         headers.append("geometry/bvh.h")
         if stage != "shadow_transmittance":
             headers.append("stages/hit.h")
+        elif features.area:
+            headers.append("geometry/surface.h")
         if crosses[stage]:
             headers += ["geometry/surface.h", "stages/boundary.h"]
         if crosses[stage] and stage != "intersect":

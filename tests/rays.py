@@ -26,7 +26,8 @@ __kernel void closest_hits(ARGUMENTS, __global const float *t_max, __global cons
 __kernel void any_hits(ARGUMENTS, __global const float *t_max, __global uint *blocked)
 {
     BEGIN
-    blocked[i] = any_hit(&scene, ray, t_max[i]);
+    const Target none = {NO_PRIMITIVE, NO_PRIMITIVE, 0u, 0.0f};
+    blocked[i] = any_hit(&scene, ray, t_max[i], &none);
 }
 """
 _ARGUMENTS = (

@@ -131,6 +131,7 @@ def source(present=PRESENT, buffers=BUFFERS, kernels=KERNELS):
     text += [layout.record_text(name, dtype) for name, dtype in layout.RECORDS.items()]
     for family, names in layout.ENUMS.items():
         text += [f"#define {family}_{name.upper()} {value}" for value, name in enumerate(names)]
+    text.append("#define NO_PRIMITIVE 0xFFFFFFFFu")
     text.append("typedef struct {float t, u, v; uint primitive;} Hit;")
     fields = (f"__global const {kind} *{name};" for name, kind in buffers.items())
     text.append("typedef struct {" + " ".join(fields) + "} Scene;")

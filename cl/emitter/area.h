@@ -55,7 +55,8 @@ INLINE float3 cone_direction(const SphereCone *cone, float u, float v, float *di
 
 #if CLVOL_HAS_AREA_MESH
 /* Uniform over a mesh: a triangle in proportion to its area, then a point of it. */
-INLINE float3 mesh_point(const Scene *scene, __global const Emitter *emitter, float choice, float u, float v, float3 *ng)
+INLINE float3 mesh_point(const Scene *scene, __global const Emitter *emitter, float choice, float u, float v, float3 *ng,
+                         uint *primitive)
 {
     const int entry = cdf_search(scene->light_cdf + emitter->first, emitter->count, choice);
     const float root = sqrt(u);
@@ -67,18 +68,21 @@ INLINE float3 mesh_point(const Scene *scene, __global const Emitter *emitter, fl
     Surface surface;
     triangle_surface(scene, &hit, scene->shapes + emitter->shape, &surface);
     *ng = surface.ng;
+    *primitive = hit.primitive;
     return surface.p;
 }
 #endif
 
-/* A point uniform over the light's area, and the unit normal of its front there. */
-INLINE float3 area_point(const Scene *scene, __global const Emitter *emitter, float choice, float u, float v, float3 *ng)
+/* A point uniform over the light's area, the unit normal of its front there, and the primitive it lies on. */
+INLINE float3 area_point(const Scene *scene, __global const Emitter *emitter, float choice, float u, float v, float3 *ng,
+                         uint *primitive)
 {
     __global const Shape *shape = scene->shapes + emitter->shape;
 #if CLVOL_HAS_AREA_MESH
     if (shape->kind == SURFACE_MESH)
-        return mesh_point(scene, emitter, choice, u, v, ng);
+        return mesh_point(scene, emitter, choice, u, v, ng, primitive);
 #endif
+    *primitive = emitter->primitive;
     __global const float *world = shape->world_from_local, *inverse = shape->local_from_world;
     const float2 turn = cos_sin_turn(v);
     float3 p, n;
@@ -106,12 +110,13 @@ INLINE void sample_area(const Scene *scene, __global const Emitter *emitter, flo
     SphereCone cone;
     if (CLVOL_HAS_AREA_SPHERE && shape->kind == SURFACE_SPHERE && sphere_cone(shape, from, &cone)) {
         light->direction = cone_direction(&cone, u, v, &light->distance);
+        light->primitive = emitter->primitive;
         light->pdf = emitter->select_pdf * cone_pdf(&cone);
         light->value = emitter_value(emitter) / light->pdf;
         return;
     }
     float3 ng;
-    const float3 to = area_point(scene, emitter, choice, u, v, &ng) - from;
+    const float3 to = area_point(scene, emitter, choice, u, v, &ng, &light->primitive) - from;
     const float square = dot(to, to);
     light->distance = sqrt(square);
     light->direction = to / max_of(light->distance, 1e-30f);

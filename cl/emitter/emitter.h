@@ -50,6 +50,7 @@ INLINE LightSample sample_light(const Scene *scene, float3 from, float choice, f
     light.distance = INFINITY;
     light.pdf = 0.0f;
 #if CLVOL_HAS_AREA
+    light.primitive = NO_PRIMITIVE;
     if (emitter->kind == EMITTER_AREA) {
         sample_area(scene, emitter, from, choice, u, v, &light);
         return light;

@@ -18,6 +18,19 @@ typedef struct {
     uint primitive; /* number of the triangle, or of triangles + number of the quadric; NO_PRIMITIVE: none */
 } Hit;
 
+/* What a ray runs to, and no obstacle to it: a point of a light. */
+typedef struct {
+    uint primitive;    /* that the point lies on; NO_PRIMITIVE: none, or one that a ray may meet before the point */
+    uint first, count; /* the light's primitives */
+    float near_;       /* from here on they are, to rounding, where the point is */
+} Target;
+
+INLINE bool is_target(const Hit *hit, const Target *target)
+{
+    return hit->primitive == target->primitive ||
+           (hit->primitive - target->first < target->count && hit->t >= target->near_);
+}
+
 #if CLVOL_HAS_TRIANGLES
 #include "geometry/triangle.h"
 #endif
@@ -256,8 +269,8 @@ INLINE Hit closest_hit(const Scene *scene, Ray ray, float after_t, uint after_pr
     return query.best;
 }
 
-/* Whether anything is hit below t_max. */
-INLINE bool any_hit(const Scene *scene, Ray ray, float t_max)
+/* Whether anything but the target is hit below t_max. */
+INLINE bool any_hit(const Scene *scene, Ray ray, float t_max, const Target *target)
 {
     Query query = query_begin(ray, 0.0f, NO_PRIMITIVE, t_max);
     uint stack[CLVOL_BVH_STACK];
@@ -268,6 +281,8 @@ INLINE bool any_hit(const Scene *scene, Ray ray, float t_max)
         const uint reference = stack[height];
         if (reference & BVH_LEAF) {
             test_leaf(scene, reference, &query);
+            if (query.found && is_target(&query.best, target))
+                query.found = false; /* and only what comes before it counts from now on */
             continue;
         }
         __global const float8 *node = scene->bvh_nodes + (size_t)reference * NODE_ROWS;

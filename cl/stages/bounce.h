@@ -30,6 +30,9 @@ INLINE void queue_shadow(const Scene *scene, uint group, uint slot, float3 from,
     set_path_shadow_origin_y(scene, slot, from.y);
     set_path_shadow_origin_z(scene, slot, from.z);
 #endif
+#if CLVOL_HAS_AREA
+    set_path_shadow_primitive(scene, slot, light->primitive);
+#endif
     set_shadow(scene, slot, value);
     queue_push(scene, group, QUEUE_SHADOW, slot);
 }

@@ -58,11 +58,26 @@ INLINE float shadow_reach(const Scene *scene, uint slot)
 }
 
 #if CLVOL_HAS_SURFACES
-/* Up to where a surface blocks the light: short of the lamp that it comes from, by what rounding may take.  At the
-   rim of a sphere that is the root of what it is elsewhere. */
-INLINE float blocking_reach(Ray ray, float reach)
+/* The lamp's point that the ray runs to.  A line meets the front of a triangle, disk, sphere or cylinder once, so what it
+   meets there is that point, however t was rounded; a sphere or cylinder that shines outwards hides behind its front.
+   One that shines inwards may be met from behind first, and so may other triangles of a mesh: they hide the point, unless
+   they are as far as it is, where rounding alone decides which side of an edge the ray passes on. */
+INLINE Target shadow_target(const Scene *scene, uint slot, Ray ray, float reach)
 {
-    return reach - (largest3(ray.o) + reach) * (CLVOL_HAS_AREA_SPHERE ? 0x1p-10f : 0x1p-18f);
+    Target target = {NO_PRIMITIVE, NO_PRIMITIVE, 0, 0.0f};
+#if CLVOL_HAS_AREA
+    const uint primitive = path_shadow_primitive(scene, slot);
+    if (primitive == NO_PRIMITIVE)
+        return target;
+    __global const Shape *shape = scene->shapes + primitive_shape(scene, primitive);
+    __global const Emitter *lamp = scene->emitters + shape->emitter;
+    const bool met_once = shape->kind == SURFACE_MESH || shape->kind == SURFACE_DISK || !shape->flip;
+    target.primitive = met_once ? primitive : NO_PRIMITIVE;
+    target.first = lamp->primitive;
+    target.count = lamp->count;
+    target.near_ = reach - (largest3(ray.o) + reach) * 0x1p-18f;
+#endif
+    return target;
 }
 #endif
 
@@ -81,12 +96,12 @@ INLINE Spectrum shadow_share(const Scene *scene, uint slot, Tally *tally)
     Inside inside;
 #endif
 #if CLVOL_HAS_PASSABLE
-    const float blocked = reach < INFINITY ? blocking_reach(ray, reach) : INFINITY;
+    const Target target = shadow_target(scene, slot, ray, reach);
     Hit hit = {0.0f, 0.0f, 0.0f, NO_PRIMITIVE};
     for (uint stretch = 0; stretch < MOST_PASSED; ++stretch) {
         const float from = hit.t;
-        hit = closest_hit(scene, ray, hit.t, hit.primitive, blocked);
-        const bool last = hit.primitive == NO_PRIMITIVE;
+        hit = closest_hit(scene, ray, hit.t, hit.primitive, reach);
+        const bool last = hit.primitive == NO_PRIMITIVE || is_target(&hit, &target);
         Surface surface;
         if (!last) {
             surface = hit_surface(scene, ray, &hit);
@@ -111,7 +126,8 @@ INLINE Spectrum shadow_share(const Scene *scene, uint slot, Tally *tally)
     return (Spectrum)(0.0f);
 #else
 #if CLVOL_HAS_SURFACES
-    if (any_hit(scene, ray, reach < INFINITY ? blocking_reach(ray, reach) : INFINITY))
+    const Target target = shadow_target(scene, slot, ray, reach);
+    if (any_hit(scene, ray, reach, &target))
         return (Spectrum)(0.0f);
 #endif
 #if CLVOL_HAS_MEDIA

@@ -48,7 +48,7 @@ INLINE void surface_next_event(const Scene *scene, uint group, uint slot, Sample
     if (material_is_smooth(side->material))
         return;
     const uint4 k = decision_block(scene, key, BLOCK_LIGHT, 0);
-    const LightSample light =
+    LightSample light =
         sample_light(scene, surface->p, uniform_below_one(k.x), uniform_below_one(k.y), uniform_below_one(k.z));
     float pdf;
     const int channel = (int)path_channel_or_zero(scene, slot);
@@ -61,7 +61,9 @@ INLINE void surface_next_event(const Scene *scene, uint group, uint slot, Sample
     Inside inside = get_inside(scene, slot);
     cross_boundary(scene->shapes + surface->shape, surface->ng, light.direction, &inside);
     set_shadow_inside(scene, slot, inside);
-    queue_shadow(scene, group, slot, spawn_point(surface->p, surface->ng, light.direction), &light, value);
+    const float3 start = spawn_point(surface->p, surface->ng, light.direction);
+    light.distance -= dot(start - surface->p, light.direction); /* now from there */
+    queue_shadow(scene, group, slot, start, &light, value);
 #endif
 }
 
