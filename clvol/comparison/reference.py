@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from clvol.errors import OptionError
+from clvol.image_reading import UnreadableError, read_stored
 from clvol.scene.digest import scene_digest
 from clvol.scene.records import Scene
 
@@ -103,7 +104,7 @@ def read_reference(path: str | os.PathLike[str], scene: Scene) -> Reference:
         image,
         variance,
         _stand_ins(image, variance, _freedom(metadata)),
-        int(metadata["spp"]) if "spp" in metadata else None,
+        _count(metadata.get("spp")),
         f"given: {os.path.basename(where)}",
         known,
         _seeds(metadata),
@@ -112,39 +113,34 @@ def read_reference(path: str | os.PathLike[str], scene: Scene) -> Reference:
 
 def _read_planes(where: str) -> tuple[dict[str, np.ndarray], dict[str, object]]:
     """Channels (height, width) by name, and the metadata."""
-    import OpenImageIO as oiio  # noqa: N813
-
     if not where.lower().endswith(".exr"):
         raise OptionError("a reference is an .exr", where=where, hint="clvol render SCENE -o reference.exr")
     if not os.path.isfile(where):
         raise OptionError("no such file", where=where)
-    opened = oiio.ImageInput.open(where)
-    if opened is None:
-        raise OptionError("cannot be read as a picture", where=where, hint=oiio.geterror())
-    spec = opened.spec()
-    pixels = opened.read_image(0, 0, 0, spec.nchannels, oiio.FLOAT)
-    reason = opened.geterror()
-    opened.close()
-    if pixels is None:
-        raise OptionError("cannot be read to its end", where=where, hint=reason)
-    names = list(spec.channelnames)
-    pixels = np.asarray(pixels).reshape(spec.height, spec.width, len(names))
-    metadata = {attribute.name: attribute.value for attribute in spec.extra_attribs}
-    return {name: pixels[..., n] for n, name in enumerate(names)}, metadata
+    try:
+        stored = read_stored(where)
+    except UnreadableError as error:
+        raise OptionError("cannot be read as a picture", where, str(error)) from None
+    return {name: stored.pixels[..., n] for n, name in enumerate(stored.channels)}, stored.metadata
+
+
+def _count(value: object) -> int | None:
+    """A number of at least 1 out of a file's metadata, which anybody may have written; None for all else."""
+    try:
+        return count if (count := int(value)) >= 1 else None
+    except (TypeError, ValueError, OverflowError):
+        return None
 
 
 def _freedom(metadata: dict[str, object]) -> int:
     """Degrees of freedom of the variance: few where sampler sobol rendered it."""
-    try:
-        return min(max(int(metadata.get("dof", _MANY)), 1), _MANY)
-    except (TypeError, ValueError):
-        return _MANY
+    return min(_count(metadata.get("dof")) or _MANY, _MANY)
 
 
 def _seeds(metadata: dict[str, object]) -> tuple[int, int] | None:
     """First and last seed: "seed" of a render, "seeds" of an earlier comparison's reference."""
     words = str(metadata.get("seeds", metadata.get("seed", ""))).split()
-    return (int(words[0]), int(words[-1])) if words and all(w.isdigit() for w in words) else None
+    return (int(words[0]), int(words[-1])) if words and all(w.isdecimal() for w in words) else None
 
 
 def _warn_of_doubts(where: str, metadata: dict[str, object], known: bool, scene: Scene) -> None:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import OpenImageIO as oiio  # noqa: N813
 
 from clvol.errors import SceneError
+from clvol.image_reading import UnreadableError, read_stored
 from clvol.scene.spectra import srgb_to_linear
-
-MAX_PIXELS = 2**28
 
 
 def read_image(path: str, where: str, raw: bool = False) -> np.ndarray:
@@ -20,25 +18,15 @@ def read_image(path: str, where: str, raw: bool = False) -> np.ndarray:
     Raises
     ------
     SceneError
-        At `where`: not an image, damaged, or larger than `MAX_PIXELS`.
+        At `where`: not an image, damaged, or larger than `image_reading.MAX_PIXELS`.
     """
-    config = oiio.ImageSpec()
-    config.attribute("oiio:UnassociatedAlpha", 1)
-    opened = oiio.ImageInput.open(path, config)
-    if opened is None:
-        raise SceneError(f"cannot read image '{path}'", where, _reason(oiio.geterror()))
     try:
-        spec = opened.spec()
-        if spec.width * spec.height * spec.depth > MAX_PIXELS:
-            raise SceneError(f"image '{path}' has more than {MAX_PIXELS} pixels", where)
-        pixels = opened.read_image(0, 0, 0, spec.nchannels, oiio.FLOAT)
-        if pixels is None:
-            raise SceneError(f"cannot read image '{path}'", where, _reason(opened.geterror()))
-        integers = str(spec.format) in ("uint8", "uint16")
-        encoded = str(spec.format) == "uint8" or (integers and opened.format_name() == "png")
-    finally:
-        opened.close()
-    return _linear_rgb(np.asarray(pixels), encoded and not raw)
+        stored = read_stored(path, channels=4)
+    except UnreadableError as error:
+        raise SceneError(f"cannot read image '{path}'", where, str(error)) from None
+    integers = stored.type_name in ("uint8", "uint16")
+    encoded = stored.type_name == "uint8" or (integers and stored.format_name == "png")
+    return _linear_rgb(stored.pixels, encoded and not raw)
 
 
 def image_from_array(array: np.ndarray, where: str, raw: bool = False) -> np.ndarray:
@@ -64,7 +52,3 @@ def image_from_array(array: np.ndarray, where: str, raw: bool = False) -> np.nda
 def _linear_rgb(pixels: np.ndarray, encoded: bool) -> np.ndarray:
     rgb = pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
     return np.ascontiguousarray(srgb_to_linear(rgb) if encoded else rgb, dtype=np.float32)
-
-
-def _reason(message: str) -> str:
-    return " ".join(message.split()) or "unknown or damaged format"
