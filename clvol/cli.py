@@ -18,6 +18,7 @@ from clvol.cli_options import (
     INTERRUPTED,
     OneLineErrors,
     RenderCommand,
+    SampleRange,
     choice_options,
     definitions_option,
     device_option,
@@ -97,6 +98,12 @@ def main(ctx: click.Context) -> None:
     help="Add a picture to the .exr, of those below; may be given several times.",
 )
 @click.option("--spp", type=click.IntRange(min=1), help="Samples per pixel; the scene's own by default.")
+@click.option(
+    "--samples",
+    type=SampleRange(),
+    metavar="FIRST,COUNT",
+    help="Only COUNT samples of each pixel, from number FIRST on, instead of the first --spp.",
+)
 @positive_option(
     "--time",
     "time_limit",

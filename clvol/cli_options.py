@@ -108,6 +108,24 @@ class Definition(click.ParamType):
         return name, text
 
 
+class SampleRange(click.ParamType):
+    """First sample and how many, as "4,12"."""
+
+    name = "first,count"
+
+    def convert(
+        self, value: str | tuple[int, int], param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        """The two numbers; `clvol.render` says what they may be."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            first, count = map(int, value.split(","))
+        except ValueError:
+            self.fail(f"takes two numbers as 4,12, not '{value}'", param, ctx)
+        return first, count
+
+
 def finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
     """Callback of a number option: refuse nan and infinity."""
     if value is not None and not math.isfinite(value):

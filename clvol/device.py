@@ -134,8 +134,21 @@ def _found() -> _Drivers:
 
 
 def list_devices() -> list[DeviceInfo]:
-    """Every OpenCL device of this machine, in the order `--device` numbers them."""
-    return [info for info, _ in _found().devices]
+    """Every OpenCL device of this machine, in the order `--device` numbers them; DeviceError for none."""
+    return [info for info, _ in _usable()]
+
+
+def _usable() -> list[tuple[DeviceInfo, cl.Device]]:
+    """Every device; DeviceError with the drivers' reasons where there is none."""
+    drivers = _found()
+    if not drivers.devices and drivers.failures:
+        raise DeviceError(f"no OpenCL device can be used: {'; '.join(drivers.failures)}")
+    if not drivers.devices:
+        raise DeviceError(
+            "no OpenCL device found",
+            hint="`pip install pocl-binary-distribution` (Linux x86-64), or install your vendor's driver",
+        )
+    return drivers.devices
 
 
 def open_device(pattern: str | None = None) -> Device:
@@ -144,15 +157,7 @@ def open_device(pattern: str | None = None) -> Device:
     Without a pattern, the variable CLVOL_DEVICE, then the first GPU, then the first device.
     Raises DeviceError where there is none.
     """
-    drivers = _found()
-    found = drivers.devices
-    if not found and drivers.failures:
-        raise DeviceError(f"no OpenCL device can be used: {'; '.join(drivers.failures)}")
-    if not found:
-        raise DeviceError(
-            "no OpenCL device found",
-            hint="`pip install pocl-binary-distribution` (Linux x86-64), or install your vendor's driver",
-        )
+    found = _usable()
     pattern = pattern if pattern is not None else os.environ.get("CLVOL_DEVICE")
     if pattern:
         chosen = [pair for pair in found if pair[0].matches(str(pattern))]

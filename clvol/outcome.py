@@ -9,7 +9,7 @@ import numpy as np
 
 from clvol import registry
 from clvol.estimate import Estimate
-from clvol.result import Result
+from clvol.result import Result, said_ranges
 from clvol.scene.digest import scene_digest
 from clvol.version import __version__
 
@@ -33,11 +33,11 @@ def make_result(session: Session, first: int, count: int) -> Result:
     pictures = _pictures(session, samples, estimate)
     aovs = {name: values.reshape(*shape, *values.shape[1:]) for name, values in pictures.items()}
     return Result.from_estimate(
-        estimate.reshaped(*shape, 3), (first, count), aovs, stats, _metadata(session, samples)
+        estimate.reshaped(*shape, 3), (first, count), aovs, stats, _metadata(session, first, samples)
     )
 
 
-def _metadata(session: Session, samples: np.ndarray) -> dict[str, Any]:
+def _metadata(session: Session, first: int, samples: np.ndarray) -> dict[str, Any]:
     """How the picture was made."""
     scene, needs, biased = session.prepared.scene, session.prepared.needs, session.biased()
     even = samples.min() == samples.max()
@@ -48,6 +48,7 @@ def _metadata(session: Session, samples: np.ndarray) -> dict[str, Any]:
         **({"majorant_scale": needs.scale} if needs.scale != 1 else {}),
         **({"biased": ", ".join(biased), "step": session.step or "voxel"} if biased else {}),
         "spp": int(samples[0]) if even else round(float(samples.mean()), 3),
+        **said_ranges(((first, int(samples.max())),)),
         "seed": session.seed,
         "device": session.device.description,
         "version": __version__,

@@ -129,8 +129,10 @@ def render(
     if piloted:
         from clvol.measure.repeat import repeat_command
 
-        # a time limit is repeated by the samples it was enough for
-        extent = {"spp": first + done} if target_error is None else {"spp": spp, "time": time_limit}
+        if target_error is not None:
+            extent = {"spp": spp, "time": time_limit}
+        else:  # a time limit is repeated by the samples it was enough for
+            extent = {"samples": f"{first},{done}"} if first else {"spp": done}
         repeat = repeat_command(scene, found.options, given | extent | {"seed": seed, "device": device})
         log.info("repeat with: %s", repeat)
         result.metadata |= {"pilot": found.options, "pilot_reason": found.reason, "repeat": repeat}

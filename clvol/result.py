@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from clvol.errors import OptionError
+from clvol.errors import OptionError, shown
 from clvol.estimate import Estimate, error_bias
 
 Ranges = tuple[tuple[int, int], ...]
@@ -61,7 +61,8 @@ class Result:
     aovs : dict of str to array (height, width) or (height, width, channels)
         Further pictures, means per path, e.g. "lookups".
     metadata : dict
-        How the picture was made: scene, choices, spp, seed, device, version, seconds.
+        How the picture was made: scene, choices, spp, seed, device, version, seconds; and "samples" where
+        they are not the first.
     samples : (int, int)
         First sample and number of samples of each pixel.
     estimate : `clvol.estimate.Moments` or `Replicates` of shape (height, width, 3)
@@ -110,7 +111,9 @@ class Result:
         height, width = self.image.shape[:2]
         keys = ("technique", "transmittance", "majorant")
         how = [str(self.metadata[key]) for key in keys if key in self.metadata]
-        about = f"{width} x {height}, {self.samples[1]} spp, noise {self.noise:.2%}"
+        (first, _), spp = self.ranges[0], self.samples[1]
+        extent = f"{spp} spp from sample {first} on" if first else f"{spp} spp"
+        about = f"{width} x {height}, {extent}, noise {self.noise:.2%}"
         return f"<Result {', '.join([about, *how])}>"
 
     @property
@@ -149,6 +152,13 @@ class Result:
             raise failure
 
 
+def said_ranges(ranges: Ranges) -> dict[str, Any]:
+    """Metadata "samples" where their number does not tell: a range as `clvol.render` takes it, or several."""
+    if ranges == ((0, ranges[0][1]),):
+        return {}
+    return {"samples": ranges[0] if len(ranges) == 1 else ranges}
+
+
 def merge(results: Iterable[Result]) -> Result:
     """Combine results of disjoint sample ranges of one render into the result of all samples.
 
@@ -159,13 +169,21 @@ def merge(results: Iterable[Result]) -> Result:
     Raises
     ------
     OptionError
-        No results; overlapping sample ranges; or another size, scene, seed or choice: which, it says.
+        No results, or something else; overlapping sample ranges; or another size, scene, seed or choice:
+        which, it says.
     """
-    if isinstance(results, Result):
+    if isinstance(results, Result) or not isinstance(results, Iterable):
         raise OptionError("merge takes a list of results", hint="merge([a, b])")
-    results = sorted(results, key=lambda result: result.ranges)
+    results = list(results)
     if not results:
         raise OptionError("nothing to merge", hint="give at least one result")
+    for one in results:
+        if not isinstance(one, Result):
+            raise OptionError(
+                f"merge takes what clvol.render returns, not {shown(one)}",
+                hint="files do not hold the sums that it needs",
+            )
+    results.sort(key=lambda result: result.ranges)
     for other in results[1:]:
         _check_same_render(results[0], other)
     estimate = reduce(lambda one, other: one.plus(other), [result.estimate for result in results])
@@ -179,6 +197,7 @@ def merge(results: Iterable[Result]) -> Result:
         metadata=_merged_metadata([result.metadata for result in results], sum(counts)),
     )
     merged.ranges = ranges
+    merged.metadata |= said_ranges(ranges)
     return merged
 
 
@@ -251,6 +270,7 @@ def _merged_metadata(parts: Sequence[dict[str, Any]], spp: int) -> dict[str, Any
     """Metadata of the whole: the shared entries, the total of samples and seconds, every device used."""
     merged = {key: value for key, value in parts[0].items() if all(part.get(key) == value for part in parts)}
     merged["spp"] = spp
+    merged.pop("samples", None)
     seconds = [part["seconds"] for part in parts if "seconds" in part]
     if seconds:
         merged["seconds"] = sum(seconds)

@@ -175,6 +175,18 @@ def test_render_writes_every_picture_and_a_summary(scene: str, tmp_path: Path) -
     assert outcome.stderr == ""
 
 
+def test_a_part_of_the_samples_says_which_and_is_what_python_renders(scene: str, tmp_path: Path) -> None:
+    outcome = run("render", scene, "-o", tmp_path / "a.exr", "--samples", "4,2", "--quiet")
+    assert outcome.exit_code == 0, outcome.output
+    opened = oiio.ImageInput.open(str(tmp_path / "a.exr"))
+    assert opened.spec().getattribute("samples") == "[4, 2]" and opened.spec().getattribute("spp") == 2
+    part = clvol.render(clvol.load_file(scene), samples=(4, 2))
+    np.testing.assert_array_equal(opened.read_image(0, 0, 0, 3, oiio.FLOAT), part.image)
+    assert part.metadata["samples"] == (4, 2)
+    for options in (["--samples", "4"], ["--samples", "4,2,1"], ["--samples", "4,2", "--spp", "3"]):
+        assert_one_line_error(run("render", scene, "-o", tmp_path / "a.exr", *options), "samples")
+
+
 def test_verbose_prints_the_plan_and_quiet_prints_nothing(scene: str, tmp_path: Path) -> None:
     verbose = run("render", scene, "-o", tmp_path / "a.exr", "-v")
     assert verbose.exit_code == 0
@@ -251,6 +263,7 @@ def test_options_reach_render_unchanged(scene: str, tmp_path: Path, monkeypatch:
     del seen["progress"]
     assert seen == {
         "spp": None,
+        "samples": None,
         "time_limit": 2.0,
         "target_error": None,
         "seed": 7,
@@ -309,6 +322,13 @@ def test_info_of_a_missing_file_is_one_line(tmp_path: Path, name: str) -> None:
 def test_info_of_a_broken_volume_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "broken.vdb").write_bytes(os.urandom(100))
     assert_one_line_error(run("info", tmp_path / "broken.vdb"), "broken.vdb")
+
+
+def test_no_device_is_an_error_in_the_list_of_devices_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    from clvol import device
+
+    monkeypatch.setattr(device, "_found", lambda: device._Drivers([], []))
+    assert_one_line_error(run("devices"), "no OpenCL device found", "install")
 
 
 def test_devices_lists_each_with_its_platform() -> None:

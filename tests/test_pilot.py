@@ -231,7 +231,10 @@ def test_the_line_that_repeats_a_render_is_a_whole_command():
 # -- a render for real --------------------------------------------------------------------------------
 
 
-def test_the_picture_is_that_of_the_choice_with_the_same_seed(caplog, monkeypatch):
+@pytest.mark.parametrize(
+    ("extent", "option"), [({"spp": 4}, "--spp 4"), ({"samples": (2, 4)}, "--samples 2,4")]
+)
+def test_the_picture_is_that_of_the_choice_with_the_same_seed(caplog, monkeypatch, extent, option):
     """Seconds are planted, so that it is not auto's choice."""
     told, seeds = [], []
     original = Candidate.render
@@ -244,17 +247,17 @@ def test_the_picture_is_that_of_the_choice_with_the_same_seed(caplog, monkeypatc
     monkeypatch.setattr(Candidate, "render", render)
     lit = scene(homogeneous(1.0, 0.5), (SKY,))
     with caplog.at_level(logging.INFO, "clvol"):
-        found = clvol.render(lit, spp=4, seed=9, technique="auto:pilot", progress=told.append)
+        found = clvol.render(lit, **extent, seed=9, technique="auto:pilot", progress=told.append)
     assert [record.what for record in told if record.what == "pilot"]
     about = found.metadata
     assert "--seed 9" in about["repeat"] and about["pilot"] in about["repeat"]
     assert "transmittance" in about["pilot_reason"] and "kernel builds" in about["pilot_reason"]
     assert about["pilot_reason"] in caplog.text and about["repeat"] in caplog.text
-    assert about["repeat"].endswith(" --spp 4 --seed 9") and " -o OUT.exr " in about["repeat"]
+    assert about["repeat"].endswith(f" {option} --seed 9") and " -o OUT.exr " in about["repeat"]
     words = about["pilot"].split()
     assert words[0] == "--transmittance" and words[1] != "none"
     options = {name.removeprefix("--"): value for name, value in zip(words[::2], words[1::2], strict=True)}
-    again = clvol.render(lit, spp=4, seed=9, **options)
+    again = clvol.render(lit, **extent, seed=9, **options)
     assert np.array_equal(found.image, again.image) and np.array_equal(found.variance, again.variance)
     assert len(set(seeds)) == len(seeds) and 9 not in seeds
 

@@ -125,6 +125,16 @@ def test_ranges_with_a_gap_merge_and_the_gap_can_be_filled() -> None:
     np.testing.assert_allclose(whole.image, make_result(0, 8).image, rtol=1e-6)
 
 
+def test_metadata_says_which_samples_where_their_number_does_not() -> None:
+    second = make_result(2, 2, samples=(2, 2))
+    assert "samples" not in merge([make_result(0, 2), second]).metadata
+    assert merge([second, make_result(4, 2, samples=(4, 2))]).metadata["samples"] == (2, 4)
+    gap = merge([make_result(0, 2), make_result(6, 2, samples=(6, 2))])
+    assert gap.metadata["samples"] == ((0, 2), (6, 2))
+    assert "samples" not in merge([gap, make_result(2, 4, samples=(2, 4))]).metadata
+    assert "2 spp from sample 2 on" in repr(second)
+
+
 def test_overlapping_samples_are_refused() -> None:
     with pytest.raises(OptionError, match="overlapping samples: 3 to 3"):
         merge([make_result(0, 4), make_result(3, 4)])
@@ -147,9 +157,22 @@ def test_results_of_another_size_are_refused() -> None:
         merge([make_result(0, 2), other])
 
 
-def test_nothing_to_merge_is_an_error() -> None:
-    with pytest.raises(OptionError, match="nothing to merge"):
-        merge([])
+@pytest.mark.parametrize(
+    ("parts", "message"),
+    [
+        ([], "nothing to merge"),
+        (
+            ["a.exr", make_result(0, 2)],
+            "merge takes what clvol.render returns, not 'a.exr'; files do not hold",
+        ),
+        ("a.exr", "merge takes what clvol.render returns"),
+        (make_result(0, 2), "a list of results"),
+        (None, "a list of results"),
+    ],
+)
+def test_what_cannot_be_merged_is_said(parts: object, message: str) -> None:
+    with pytest.raises(OptionError, match=message):
+        merge(parts)
 
 
 # --- EXR -------------------------------------------------------------------------------------------

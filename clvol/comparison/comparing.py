@@ -14,7 +14,7 @@ from clvol.choices import Choices
 from clvol.comparison.bar import Bar
 from clvol.comparison.combine import open_lineup
 from clvol.comparison.figures import Comparison, compute_figures
-from clvol.comparison.measure import Measured, Plan, Told, measure
+from clvol.comparison.measure import REFERENCE_SAMPLES, Measured, Plan, Told, measure
 from clvol.comparison.names import names_asked
 from clvol.comparison.reference import Reference, read_reference
 from clvol.device import Device, open_device
@@ -23,9 +23,12 @@ from clvol.measure.efficiency import LEAST_ROUNDS
 from clvol.measure.trials import Trial
 from clvol.scene.digest import scene_digest
 from clvol.scene.records import Scene
+from clvol.session import MAX_SAMPLES
 from clvol.version import __version__
 
 DEFAULT_SECONDS = 10.0
+MOST_ROUNDS = 10_000
+"""Every round's picture is kept."""
 
 
 def compare(
@@ -126,10 +129,15 @@ def _plan(
         positive("time limit ", time_limit, " of seconds")
     seed = check_seed(scene.seed if seed is None else seed)
     least = {"rounds": LEAST_ROUNDS, "spp": 1, "reference_spp": 1}
+    most = {"rounds": MOST_ROUNDS, "spp": MAX_SAMPLES // REFERENCE_SAMPLES, "reference_spp": MAX_SAMPLES}
     given = {"rounds": rounds, "spp": spp, "reference_spp": reference_spp}
     for name, value in given.items():
-        if value is not None and whole(name, value) < least[name]:
+        if value is None:
+            continue
+        if whole(name, value) < least[name]:
             raise OptionError(f"{name}={value} is too few", hint=f"give at least {least[name]}")
+        if value > most[name]:
+            raise OptionError(f"{name}={value} is too many", hint=f"give at most {most[name]}")
     return Plan(rounds, time_limit or DEFAULT_SECONDS, spp, reference_spp, seed)
 
 

@@ -35,6 +35,7 @@ from clvol.measure.reduced import reduced
 from clvol.measure.trials import Trial, rounds
 from clvol.result import Result
 from clvol.scene.records import Scene
+from clvol.session import MAX_SAMPLES
 
 LEAST_ROUNDS, MOST_ROUNDS = 4, 32
 ENOUGH_ROUNDS = 2
@@ -191,8 +192,8 @@ def selftest(
     if seconds is not None:
         positive("", seconds, " of seconds")
     seed = check_seed(seed)
-    if spp is not None and whole("spp", spp) < 1:
-        raise OptionError(f"spp={spp} is too few", hint="give at least 1")
+    if spp is not None and not 1 <= whole("spp", spp) <= MAX_SAMPLES:
+        raise OptionError(f"spp={spp} cannot be rendered", hint=f"give 1 to {MAX_SAMPLES}")
     effort = QUICK if quick else FULL
     tell = progress or (lambda what, done, total: None)
     small, opened = reduced(scene, effort.pixels), open_device(device)
