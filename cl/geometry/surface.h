@@ -10,6 +10,7 @@ typedef struct {
     float3 s, t; /* tangents; with the shading normal n they make an orthonormal, right-handed frame */
     float3 n;
     float2 uv;
+    float span; /* magnitude, along ng, of what p was computed from */
     uint shape;
 } Surface;
 
@@ -21,6 +22,16 @@ INLINE float3 to_local(const Surface *surface, float3 world)
 INLINE float3 to_world(const Surface *surface, float3 d)
 {
     return d.x * surface->s + d.y * surface->t + d.z * surface->n;
+}
+
+/* A third of the magnitudes, along the unit normal, of what a point is the sum of: about its own largest coordinate,
+   but for large shapes. */
+INLINE float span_of(float3 ng, float3 a, float3 b, float3 c)
+{
+    return (abs_of(ng.x) * (abs_of(a.x) + abs_of(b.x) + abs_of(c.x)) +
+            abs_of(ng.y) * (abs_of(a.y) + abs_of(b.y) + abs_of(c.y)) +
+            abs_of(ng.z) * (abs_of(a.z) + abs_of(b.z) + abs_of(c.z))) *
+           (1.0f / 3.0f);
 }
 
 /* Frame round the normal n whose first tangent follows dp/du, any where that is none. */
@@ -57,6 +68,7 @@ INLINE void triangle_surface(const Scene *scene, const Hit *hit, __global const 
     const float3 e1 = b - a, e2 = c - a;
     surface->p = a + u * e1 + v * e2;
     surface->ng = normalize(cross(e1, e2));
+    surface->span = span_of(surface->ng, a, e1, e2);
     surface->uv = (float2)(u, v);
     float3 dp_du = e1;
 #if CLVOL_HAS_VERTEX_UVS
@@ -122,6 +134,8 @@ INLINE void quadric_surface(const Scene *scene, Ray ray, const Hit *hit, __globa
                                   m[2] * normal.x + m[6] * normal.y + m[10] * normal.z));
     n = shape->flip ? -n : n;
     surface->ng = n;
+    __global const float *w = shape->world_from_local;
+    surface->span = span_of(n, (float3)(w[3], w[7], w[11]), surface->p - (float3)(w[3], w[7], w[11]), (float3)(0.0f));
     set_frame(surface, n, transform_vector(shape->world_from_local, dp_du));
 }
 #endif
@@ -144,13 +158,14 @@ INLINE Surface hit_surface(const Scene *scene, Ray ray, const Hit *hit)
 }
 
 /* A point just off the surface, on the side of `ng` that d points to: moved along the normal by some units in the
-   last place of every coordinate (after Wächter and Binder 2019), so that the new ray does not meet it again. */
-INLINE float3 spawn_point(float3 p, float3 ng, float3 d)
+   last place of every coordinate (after Wächter and Binder 2019), so that the new ray does not meet it again.  Where a
+   large slanted triangle or sphere passes near the origin, its own coordinates are what was rounded. */
+INLINE float3 spawn_point(const Surface *surface, float3 d)
 {
-    const float3 n = dot(ng, d) < 0.0f ? -ng : ng;
-    const float largest = largest3(p);
+    const float3 n = dot(surface->ng, d) < 0.0f ? -surface->ng : surface->ng;
+    const float largest = max_of(largest3(surface->p), surface->span);
     const float distance = (largest + 1e-30f) * 0x1p-20f; /* 8 units in the last place of the largest */
-    return p + distance * n;
+    return surface->p + distance * n;
 }
 
 #endif

@@ -61,7 +61,7 @@ INLINE void surface_next_event(const Scene *scene, uint group, uint slot, Sample
     Inside inside = get_inside(scene, slot);
     cross_boundary(scene->shapes + surface->shape, surface->ng, light.direction, &inside);
     set_shadow_inside(scene, slot, inside);
-    const float3 start = spawn_point(surface->p, surface->ng, light.direction);
+    const float3 start = spawn_point(surface, light.direction);
     light.distance -= dot(start - surface->p, light.direction); /* now from there */
     queue_shadow(scene, group, slot, start, &light, value);
 #endif
@@ -88,7 +88,7 @@ INLINE bool leave_surface(const Scene *scene, uint slot, SampleKey key, const Su
     Inside inside = get_inside(scene, slot);
     cross_boundary(scene->shapes + surface->shape, surface->ng, d, &inside);
     set_inside(scene, slot, inside);
-    set_path_origin(scene, slot, spawn_point(surface->p, surface->ng, d));
+    set_path_origin(scene, slot, spawn_point(surface, d));
     set_path_direction(scene, slot, d);
     set_beta(scene, slot, beta);
 #if CLVOL_MIS
