@@ -30,6 +30,7 @@ from clvol.cli_options import (
 )
 from clvol.cli_ray import ray
 from clvol.cli_selftest import selftest
+from clvol.errors import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -246,10 +247,14 @@ def info(file: str, grid: str | None, definitions: tuple[tuple[str, str], ...]) 
     if Path(file).suffix.lower() == ".xml":
         import clvol
 
+        if grid is not None:
+            raise click.UsageError("--grid chooses from a volume file, and this is a scene")
         lines = describe.describe_scene(clvol.load_file(file, **dict(definitions)))
     else:
+        if definitions:
+            raise click.UsageError("-D fills a scene's $NAMES, and this is a volume file")
         lines = describe.describe_volume(file, grid)
-    click.echo("\n".join(lines))
+    click.echo("\n".join(printable(line) for line in lines))
 
 
 @main.command()

@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 
 import click
 
-from clvol.errors import DeviceError, Error, OptionError, shortened
+from clvol.errors import DeviceError, Error, OptionError, printable, shortened
 
 USER_ERROR = 2
 LONGEST_LINE = 3000
@@ -54,7 +54,7 @@ class OneLineErrors(click.Group):
 
 def fail(message: str, whole: bool = False) -> NoReturn:
     """Print one line on standard error, or the `whole` text (a build log), and exit with status 2."""
-    line = message if whole else shortened(" ".join(message.split()), LONGEST_LINE)
+    line = message if whole else printable(shortened(" ".join(message.split()), LONGEST_LINE))
     click.echo(f"clvol: error: {line}", err=True)
     sys.exit(USER_ERROR)
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from clvol.scene import records
 from clvol.scene.materials import Bsdf, Dielectric, Mask, Null, TwoSided
-from clvol.volumes import VdbGridInfo, list_vdb, read_volume
+from clvol.volumes import VdbGridInfo, list_vdb, read_vdb, read_volume
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
-from clvol.volumes.vdb import VALUE_TYPES
 
 
 def format_bytes(count: float) -> str:
@@ -28,18 +28,21 @@ def describe_volume(path: str, grid: str | None = None) -> list[str]:
     """Every grid of a volume file, or the one named; VolumeError where the file cannot be read."""
     if grid is not None or Path(path).suffix.lower() != ".vdb":
         return describe_grid(read_volume(path, grid))
-    return [line for stored in list_vdb(path) for line in _vdb_lines(path, stored)]
+    stored = list_vdb(path)
+    lines = [line for number, info in enumerate(stored) for line in _vdb_lines(path, number, info)]
+    return lines or [f"{path}: it has no grids"]
 
 
-def _vdb_lines(path: str, stored: VdbGridInfo) -> Iterator[str]:
-    readable = stored.value_type in VALUE_TYPES and stored.index_to_world is not None
-    if readable:
-        yield from describe_grid(read_volume(path, stored.name))
+def _vdb_lines(path: str, number: int, stored: VdbGridInfo) -> Iterator[str]:
+    if stored.unreadable:
+        yield f"{stored.name}: cannot be rendered, {stored.unreadable}"
     else:
-        yield f"{stored.name}: cannot be rendered"
+        yield from describe_grid(read_vdb(path, number))
     precision = " in half precision" if stored.half else ""
     compression = ", ".join(stored.compression) or "no compression"
     yield f"  stored   {stored.value_type}{precision}, {compression}, {stored.transform}"
+    if stored.parent:
+        yield f"  shared   its tree is that of {stored.parent}"
 
 
 def describe_grid(grid: Grid) -> list[str]:
@@ -52,48 +55,83 @@ def _dense_lines(grid: DenseGrid) -> Iterator[str]:
     plural = "s" if channels > 1 else ""
     yield f"{grid.name or 'grid'}: dense, {width} x {height} x {depth} samples, {channels} channel{plural}"
     yield f"  box      {_box(grid.box)}"
-    finite = grid.values[np.isfinite(grid.values)]
-    broken = grid.values.size - finite.size
-    extent = f"{_number(finite.min())} to {_number(finite.max())}" if finite.size else "none"
-    yield f"  values   {extent}" + (f"; {broken:,} are NaN or infinite" if broken else "")
-    yield f"  sum      {_number(finite.sum(dtype=np.float64))}"
+    yield from _value_lines(Statistics.of(grid.values))
     yield f"  memory   {format_bytes(grid.values.nbytes)}"
 
 
 def _sparse_lines(grid: SparseGrid) -> Iterator[str]:
-    lower, upper = grid.active_box
-    size = upper - lower + 1
-    share = grid.active_voxels / max(int(size.astype(np.int64).prod()), 1)
-    low, high, total = active_statistics(grid)
     stored = (grid.leaf_origins, grid.leaf_values, grid.leaf_active, grid.tile_origins, grid.tile_values)
-    yield f"{grid.name}: sparse, {size[0]} x {size[1]} x {size[2]} samples in the active box"
-    yield f"  box      {_box(grid.active_box)} (index)"
-    yield f"           {_box(_world_box(grid))} (world)"
-    yield (
-        f"  active   {grid.active_voxels:,} voxels, {100 * share:.3g} % of the box; "
-        f"{len(grid.leaf_origins):,} leaves, {int(grid.tile_active.sum()):,} active tiles"
-    )
-    yield f"  values   {_number(low)} to {_number(high)}, background {_number(grid.background)}"
-    yield f"  sum      {_number(total)}"
+    background = f", background {_number(grid.background)}"
+    if grid.active_voxels == 0:
+        yield f"{grid.name}: sparse, no active voxels{background}: there is nothing to render"
+    else:
+        lower, upper = grid.active_box
+        size = upper - lower + 1
+        share = grid.active_voxels / int(size.astype(np.int64).prod())
+        yield f"{grid.name}: sparse, {size[0]} x {size[1]} x {size[2]} samples in the active box"
+        yield f"  box      {_box(grid.active_box)} (index)"
+        yield f"           {_box(_world_box(grid))} (world)"
+        yield (
+            f"  active   {grid.active_voxels:,} voxels, {100 * share:.3g} % of the box; "
+            f"{len(grid.leaf_origins):,} leaves, {int(grid.tile_active.sum()):,} active tiles"
+        )
+        yield from _value_lines(active_statistics(grid), background)
     yield f"  memory   {format_bytes(sum(array.nbytes for array in stored))}"
 
 
-def active_statistics(grid: SparseGrid) -> tuple[float, float, float]:
-    """Minimum, maximum and sum of the active samples; nan, nan, 0 where there are none.
+@dataclass(frozen=True)
+class Statistics:
+    """Range (nan, nan of none) and sum of the finite samples; how many there are in all, NaN and infinite."""
 
-    A tile counts with all its samples.  The mask's bit order is OpenVDB's, x slowest, while the values
-    lie z slowest.
+    low: float
+    high: float
+    total: float
+    count: int
+    nan: int
+    infinite: int
+
+    @classmethod
+    def of(cls, values: np.ndarray, each: np.ndarray | None = None) -> Statistics:
+        """Of values that stand for one sample each, or for so many."""
+        count, nan, infinite = (
+            int(np.count_nonzero(chosen) if each is None else each[chosen].sum())
+            for chosen in (np.ones(values.shape, bool), np.isnan(values), np.isinf(values))
+        )
+        if nan or infinite:
+            finite = np.isfinite(values)
+            values, each = values[finite], None if each is None else each[finite]
+        if not values.size:
+            return cls(np.nan, np.nan, 0.0, count, nan, infinite)
+        total = np.sum(values if each is None else values * each, dtype=np.float64)
+        return cls(float(values.min()), float(values.max()), float(total), count, nan, infinite)
+
+    def __add__(self, other: Statistics) -> Statistics:
+        low, high = np.fmin(self.low, other.low), np.fmax(self.high, other.high)
+        counts = (
+            getattr(self, name) + getattr(other, name) for name in ("total", "count", "nan", "infinite")
+        )
+        return Statistics(float(low), float(high), *counts)
+
+
+def _value_lines(found: Statistics, more: str = "") -> Iterator[str]:
+    extent = "none finite" if np.isnan(found.low) else f"{_number(found.low)} to {_number(found.high)}"
+    broken = [f"{n:,} {what}" for n, what in ((found.nan, "NaN"), (found.infinite, "infinite")) if n]
+    counted = f"; {' and '.join(broken)} of {found.count:,}" if broken else ""
+    yield f"  values   {extent}{more}{counted}"
+    yield f"  sum      {_number(found.total)}{' of the others' if broken else ''}"
+
+
+def active_statistics(grid: SparseGrid) -> Statistics:
+    """Of the active samples; a tile counts with all of its own.
+
+    The mask's bit order is OpenVDB's, x slowest, while the values lie z slowest.
     """
     bits = np.unpackbits(grid.leaf_active, axis=1, bitorder="little").astype(bool)
     active = bits.reshape(-1, 8, 8, 8).transpose(0, 3, 2, 1)
-    voxels = grid.leaf_values[active]
-    tiles = grid.tile_values[grid.tile_active]
-    tile_samples = grid.tile_sizes[grid.tile_active].astype(np.float64) ** 3
-    values = np.concatenate([voxels, tiles])
-    if values.size == 0:
-        return np.nan, np.nan, 0.0
-    total = voxels.sum(dtype=np.float64) + (tiles * tile_samples).sum()
-    return float(values.min()), float(values.max()), float(total)
+    tile_samples = grid.tile_sizes[grid.tile_active].astype(np.int64) ** 3
+    return Statistics.of(grid.leaf_values[active]) + Statistics.of(
+        grid.tile_values[grid.tile_active], tile_samples
+    )
 
 
 def _world_box(grid: SparseGrid) -> np.ndarray:

@@ -6,14 +6,13 @@ at the first launch that writes there.  So what is handed out is added up, and w
 
 from __future__ import annotations
 
-import resource
 import weakref
-from pathlib import Path
 
 import numpy as np
 import pyopencl as cl
 
 from clvol.errors import DeviceError
+from clvol.memory import available_memory
 
 KEPT_FREE = 1 / 16
 """Share of the machine's free memory that buffers leave to everything else."""
@@ -81,49 +80,6 @@ class DeviceMemory:
 
     def _give_back(self, size: int) -> None:
         self.taken -= size
-
-
-def available_memory() -> int | None:
-    """Bytes this process may still take: by the machine, its group and its limits; None if unknown."""
-    found = [_free_of_machine(), _free_of_group(), _free_of_process()]
-    return min((size for size in found if size is not None), default=None)
-
-
-def _free_of_machine() -> int | None:
-    kilobytes = _fields(Path("/proc/meminfo")).get("MemAvailable:")
-    return None if kilobytes is None else 1024 * kilobytes
-
-
-def _free_of_group(root: Path = Path("/sys/fs/cgroup")) -> int | None:
-    """Of the process's control group, as containers have one; what only caches files counts as free."""
-    for folder, limit, used, cached in (
-        (root, "memory.max", "memory.current", "inactive_file"),
-        (root / "memory", "memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
-    ):
-        try:
-            free = int((folder / limit).read_text()) - int((folder / used).read_text())
-        except (OSError, ValueError):  # no such group, or no limit ("max")
-            continue
-        return max(0, free + _fields(folder / "memory.stat").get(cached, 0))
-    return None
-
-
-def _free_of_process() -> int | None:
-    """Of the address space that `ulimit -v` grants."""
-    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    used = _fields(Path("/proc/self/status")).get("VmSize:")
-    if limit == resource.RLIM_INFINITY or used is None:
-        return None
-    return max(0, limit - 1024 * used)
-
-
-def _fields(path: Path) -> dict[str, int]:
-    """Lines of "name number …" in one of the system's files."""
-    try:
-        lines = [line.split() for line in path.read_text().splitlines()]
-    except OSError:
-        return {}
-    return {words[0]: int(words[1]) for words in lines if len(words) > 1 and words[1].isdigit()}
 
 
 def _megabytes(size: int) -> str:

@@ -16,6 +16,11 @@ def shortened(text: str, longest: int = LONGEST) -> str:
     return f"{text[:head]}…{text[head + 1 - longest :]}"
 
 
+def printable(text: str) -> str:
+    """The text with what would move the cursor, colour the terminal or turn the line round as escapes."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
 def shown(value: object, longest: int = 60) -> str:
     """A caller's value for a message: its `repr`, shortened, or its type where it has none."""
     try:

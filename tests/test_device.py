@@ -13,6 +13,7 @@ from clvol import device_memory
 from clvol.device import open_device
 from clvol.device_memory import DeviceMemory
 from clvol.errors import DeviceError
+from clvol.memory import _free_of_group
 from clvol.scene.records import ConstantEmitter
 
 
@@ -110,7 +111,7 @@ def test_free_memory_heeds_control_groups(tmp_path):
             path.write_text(text)
 
     def free(folder):
-        return device_memory._free_of_group(tmp_path / folder)
+        return _free_of_group(tmp_path / folder)
 
     write("two", memory__max="1000\n", memory__current="900\n", memory__stat="inactive_file 300\n")
     write("none", memory__max="max\n", memory__current="900\n")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import random
 import re
@@ -194,7 +195,7 @@ def test_a_zip_block_with_a_wrong_checksum_or_none_is_refused():
 
 @pytest.mark.parametrize("codec", [ZIP, BLOSC])
 def test_a_block_larger_than_any_compressor_makes_is_not_even_copied(codec):
-    stream = VdbStream(struct.pack("<q", 16 << 20) + bytes(16 << 20), "a.vdb")
+    stream = VdbStream(io.BytesIO(struct.pack("<q", 16 << 20) + bytes(16 << 20)), "a.vdb")
 
     def read():
         with pytest.raises(VolumeError, match="takes 16777216 bytes compressed"):

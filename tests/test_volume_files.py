@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import mmap
 import os
 import random
 import struct
@@ -41,13 +40,6 @@ def ramp(*shape: int, dtype="f4") -> np.ndarray:
     return np.arange(np.prod(shape)).reshape(shape).astype(dtype)
 
 
-def is_mapped(values: np.ndarray) -> bool:
-    """The array's memory is a file's."""
-    while isinstance(values, np.ndarray):
-        values = values.base
-    return isinstance(values, mmap.mmap)
-
-
 def peak_bytes(action) -> int:
     tracemalloc.start()
     try:
@@ -70,14 +62,13 @@ def refuses(action, message: str, path) -> VolumeError:
 
 
 @pytest.mark.parametrize("shape", [(2, 3, 4), (2, 3, 4, 1), (2, 3, 4, 3)])
-def test_vol_reads_back_what_was_written_without_a_copy(tmp_path, shape):
+def test_vol_reads_back_what_was_written(tmp_path, shape):
     values = ramp(*shape)
     write_vol(tmp_path / "a.vol", values, BOX)
     read = read_vol(tmp_path / "a.vol")
     assert np.array_equal(read.values, values.reshape(2, 3, 4, -1))
     assert (read.values.dtype, read.values.flags.writeable) == (np.float32, False)
     assert read.values.flags.c_contiguous
-    assert is_mapped(read.values)
     assert (read.box.tolist(), read.box.dtype) == (BOX.tolist(), np.float64)
     assert (read.name, read.source) == ("a", str(tmp_path / "a.vol"))
 
@@ -142,11 +133,10 @@ def test_write_vol_refuses_what_mitsuba_could_not_read(tmp_path):
 # NumPy
 
 
-def test_float32_npy_stays_a_read_only_map(tmp_path):
+def test_a_float32_npy_takes_no_more_than_its_size(tmp_path):
     np.save(tmp_path / "a.npy", ramp(2, 3, 4))
     read = read_numpy(tmp_path / "a.npy", max_bytes=0)
     assert np.array_equal(read.values, ramp(2, 3, 4, 1))
-    assert is_mapped(read.values)
     assert not read.values.flags.writeable
     assert read.box.tolist() == UNIT_BOX
     assert (read.name, read.source) == ("a", str(tmp_path / "a.npy"))
@@ -203,8 +193,8 @@ def test_ct_scan_of_a_stent_is_read():
         (np.zeros((2, 2, 2), [("a", "f4")]), "real numbers"),
         (np.ones((3, 4)), "2 axes"),
         (np.ones((1, 2, 3, 4, 5)), "5 axes"),
-        (np.ones((2, 3, 4, 2)), "2 channels"),
-        (np.ones((2, 3, 4, 6)), "6 channels"),
+        (np.ones((2, 3, 4, 2)), "has 1 or 3 channels, not 2"),
+        (np.ones((2, 3, 4, 6)), "has 1 or 3 channels, not 6"),
         (np.ones((2, 0, 4)), "no samples"),
         (np.float32(1), "0 axes|not that of an array"),
     ],
@@ -217,9 +207,7 @@ def test_arrays_that_are_no_volumes_are_refused_wherever_they_come_from(tmp_path
     refuses(lambda: dense_from_array(array, "data", "here.xml"), message, "here.xml, grid 'data'")
 
 
-def test_dense_from_array_keeps_c_order_float32_and_refuses_ragged_lists():
-    values = ramp(2, 3, 4)
-    assert np.shares_memory(dense_from_array(values).values, values)
+def test_dense_from_array_takes_lists_and_refuses_ragged_ones():
     assert dense_from_array([[[1, 2]]]).values.shape == (1, 1, 2, 1)
     refuses(lambda: dense_from_array([[[1], [1, 2]]], "data"), "not an array", "grid 'data'")
 
@@ -284,8 +272,8 @@ def test_conversions_beyond_max_bytes_are_refused(tmp_path):
             lambda n=needed: read_numpy(tmp_path / "a.npy", max_bytes=n - 1), "the limit is 255", tmp_path
         )
     np.savez(tmp_path / "a.npz", ramp(4, 4, 4).astype("i2"))
-    assert read_numpy(tmp_path / "a.npz", max_bytes=384).values.size == 64
-    refuses(lambda: read_numpy(tmp_path / "a.npz", max_bytes=383), "the limit is 383", tmp_path)
+    assert read_numpy(tmp_path / "a.npz", max_bytes=256).values.size == 64
+    refuses(lambda: read_numpy(tmp_path / "a.npz", max_bytes=255), "the limit is 255", tmp_path)
 
 
 def test_an_npz_bomb_is_refused_by_the_limit_before_it_is_inflated(tmp_path):

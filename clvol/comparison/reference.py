@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from clvol.errors import OptionError
+from clvol.files import other_kind
 from clvol.image_reading import UnreadableError, read_stored
 from clvol.scene.digest import scene_digest
 from clvol.scene.records import Scene
@@ -115,6 +116,8 @@ def _read_planes(where: str) -> tuple[dict[str, np.ndarray], dict[str, object]]:
     """Channels (height, width) by name, and the metadata."""
     if not where.lower().endswith(".exr"):
         raise OptionError("a reference is an .exr", where=where, hint="clvol render SCENE -o reference.exr")
+    if kind := other_kind(where):
+        raise OptionError(f"is {kind}, not a picture", where=where)
     if not os.path.isfile(where):
         raise OptionError("no such file", where=where)
     try:

@@ -8,8 +8,8 @@ from dataclasses import fields, is_dataclass
 import numpy as np
 
 _BLOCKS, _BLOCK_VALUES = 256, 4096
-"""Of a larger array this many blocks of so many values, evenly spread, are looked at: a volume that is
-mapped from its file is not read whole again."""
+"""Of a larger array this many blocks of so many values, evenly spread, are looked at: a large volume would
+take seconds."""
 
 
 def scene_digest(scene: object) -> str:

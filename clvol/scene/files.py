@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from clvol.errors import SceneError
+from clvol.files import other_kind
 from clvol.scene.reader import Reader
 
 
@@ -15,7 +16,7 @@ def find(name: str, folders: Sequence[Path], where: str) -> Path:
     Raises
     ------
     SceneError
-        At `where`: no such file.
+        At `where`: no such file, or something that is no regular file, such as a pipe.
     """
     for folder in folders:
         path = folder / name
@@ -24,6 +25,8 @@ def find(name: str, folders: Sequence[Path], where: str) -> Path:
                 return path
         except (OSError, ValueError):  # a name too long for the system, or with a NUL in it
             continue
+        if kind := other_kind(path):
+            raise SceneError(f"'{path}' is {kind}, not a file", where)
     looked = ", ".join(str(folder.absolute()) for folder in folders)
     hint = "check the absolute path" if Path(name).is_absolute() else f"looked in {looked}"
     raise SceneError(f"file '{name}' does not exist", where, hint)

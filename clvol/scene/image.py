@@ -6,6 +6,7 @@ import numpy as np
 
 from clvol.errors import SceneError
 from clvol.image_reading import UnreadableError, read_stored
+from clvol.masks import masked_count
 from clvol.scene.spectra import srgb_to_linear
 
 
@@ -37,8 +38,12 @@ def image_from_array(array: np.ndarray, where: str, raw: bool = False) -> np.nda
     Raises
     ------
     SceneError
-        At `where`: another shape, or another integer type.
+        At `where`: another shape, another integer type, or masked pixels.
     """
+    if masked_count(array):
+        what = f"{masked_count(array)} of {array.size} values are masked, a picture needs them all"
+        raise SceneError(what, where, "give them values: array.filled(0)")
+    array = np.ma.getdata(array)
     pixels = array[..., None] if array.ndim == 2 else array
     if pixels.ndim != 3 or not 1 <= pixels.shape[2] <= 4 or pixels.size == 0:
         raise SceneError(f"expected an image (height, width, 3), got shape {array.shape}", where)

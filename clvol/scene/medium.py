@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import replace
 
 import numpy as np
 
-from clvol.scene.reader import Reader
+from clvol.scene.reader import ROUNDING, Reader
 from clvol.scene.records import ConstVolume, GridVolume, Medium, Phase, Spectrum, Volume
-from clvol.scene.volume import channels_of, largest_value
+from clvol.scene.volume import channels_of, largest_value, limited
 from clvol.volumes import check_coefficients, check_finite
 from clvol.volumes.proportional import proportional_channels
+
+log = logging.getLogger("clvol")
 
 
 def homogeneous(reader: Reader) -> Medium:
@@ -86,9 +89,11 @@ def _coefficient(
     volume = _volume(reader, name, "a number, a colour or a volume")
     if isinstance(volume, GridVolume):
         check_coefficients(volume.grid, f"{name} of medium '{reader.type}'")
-    if np.isfinite(maximum) and largest_value(volume) > maximum:
-        largest = largest_value(volume)
-        reader.fail(f"'{name}' must be at most {maximum:g}, the volume reaches {largest:g}", name)
+    if np.isfinite(maximum) and (largest := largest_value(volume)) > maximum:
+        if largest > maximum * (1 + ROUNDING):
+            reader.fail(f"'{name}' must be at most {maximum:g}, the volume reaches {largest:.9g}", name)
+        log.warning("%s: the volume reaches %.9g, taken as %g", reader.node.place(name), largest, maximum)
+        volume = limited(volume, maximum)
     return volume
 
 

@@ -5,6 +5,7 @@ A builder asks for every parameter it knows and then calls `finish`, which refus
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, NoReturn
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clvol.errors import SceneError
+from clvol.masks import as_array, masked_count
 from clvol.scene import spectra
 from clvol.scene.nodes import Node
 from clvol.scene.records import Spectrum
@@ -21,6 +23,11 @@ from clvol.scene.vocabulary import did_you_mean, join_hints, listed
 
 if TYPE_CHECKING:
     from clvol.scene.builder import Builder
+
+log = logging.getLogger("clvol")
+
+ROUNDING = 1e-6
+"""Share by which colours and volumes may exceed their maximum: rounding of what wrote them, which is cut."""
 
 
 class Reader:
@@ -119,7 +126,8 @@ class Reader:
         value = self._take(name)
         try:
             vector = np.asarray(value)
-            vector = vector.astype(np.float64) if vector.dtype.kind in "iuf" else np.empty(0)
+            numbers = vector.dtype.kind in "iuf" and not masked_count(value)
+            vector = vector.astype(np.float64) if numbers else np.empty(0)
         except (TypeError, ValueError, OverflowError):
             vector = np.empty(0)
         if vector.shape != (3,) or not np.isfinite(vector).all():
@@ -138,10 +146,10 @@ class Reader:
             ) from None
 
     def array(self, name: str) -> np.ndarray:
-        """A numeric NumPy array, or what turns into one; `name` must be given."""
+        """A numeric NumPy array, or what turns into one, with its masks; `name` must be given."""
         value = self._take(name)
         try:
-            array = np.asarray(value)
+            array = as_array(value)
         except (TypeError, ValueError, OverflowError):
             array = np.empty(0, dtype=object)
         if array.dtype.kind not in "buif":
@@ -173,9 +181,11 @@ class Reader:
             rgb = self._spectrum(name, value, light, maximum)
         else:
             self._wrong(name, "a number, an rgb or a spectrum", value)
-        if not np.isfinite(rgb).all() or (rgb < 0).any() or (rgb > maximum).any():
+        if not np.isfinite(rgb).all() or (rgb < 0).any() or (rgb > maximum * (1 + ROUNDING)).any():
             self._wrong(name, _range(0, maximum, False), rgb.tolist())
-        components = tuple(rgb.tolist())
+        if (rgb > maximum).any():
+            log.warning("%s: %.9g is taken as %g", self.node.place(name), rgb.max(), maximum)
+        components = tuple(np.minimum(rgb, maximum).tolist())
         return components[:1] if len(set(components)) == 1 else components
 
     def _colour_value(self, name: str, node: Node) -> object:
@@ -190,7 +200,7 @@ class Reader:
     def _rgb(self, name: str, node: Node) -> np.ndarray:
         value = self._colour_value(name, node)
         try:
-            rgb = np.array(value, dtype=np.float64).reshape(-1)
+            rgb = np.ma.filled(as_array(value).astype(np.float64), np.nan).reshape(-1)
         except (TypeError, ValueError, OverflowError):
             rgb = np.empty(0)
         if rgb.size not in (1, 3):
@@ -202,7 +212,7 @@ class Reader:
         if isinstance(value, Real) and not isinstance(value, bool):
             return spectra.constant_to_rgb(_float(value)) if light else np.array([_float(value)])
         try:
-            pairs = np.array(value, dtype=np.float64)
+            pairs = np.ma.filled(as_array(value).astype(np.float64), np.nan)
         except (TypeError, ValueError, OverflowError):
             pairs = np.empty(0)
         if pairs.ndim != 2 or pairs.shape[1:] != (2,) or len(pairs) < 2:

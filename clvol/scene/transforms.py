@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clvol.errors import SceneError
+from clvol.masks import as_array
 
 
 def translate(v: ArrayLike) -> np.ndarray:
@@ -78,10 +79,7 @@ def as_matrix(value: object) -> np.ndarray:
     SceneError
         Not a 4x4 matrix of finite numbers, a last row other than 0 0 0 1, or singular.
     """
-    try:
-        matrix = np.array(getattr(value, "matrix", value), dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        matrix = np.empty(0)
+    matrix = _numbers(getattr(value, "matrix", value))
     if matrix.shape != (4, 4):
         raise SceneError(
             "expected a transform: a 4x4 array, or an object with a 4x4 .matrix",
@@ -97,11 +95,16 @@ def as_matrix(value: object) -> np.ndarray:
     return matrix
 
 
-def _vector(value: ArrayLike, what: str) -> np.ndarray:
+def _numbers(value: ArrayLike) -> np.ndarray:
+    """A float64 copy, NaN where elements are masked; empty where there are no numbers."""
     try:
-        vector = np.array(value, dtype=np.float64)
+        return np.ma.filled(np.ma.array(as_array(value), np.float64, copy=True), np.nan)
     except (TypeError, ValueError, OverflowError):
-        vector = np.empty(0)
+        return np.empty(0)
+
+
+def _vector(value: ArrayLike, what: str) -> np.ndarray:
+    vector = _numbers(value)
     if vector.shape == ():
         vector = np.full(3, vector)
     if vector.shape != (3,) or not np.isfinite(vector).all():

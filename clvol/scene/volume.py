@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import logging
+from dataclasses import replace
+
 import numpy as np
 
 from clvol.scene.files import find_parameter
@@ -9,7 +12,10 @@ from clvol.scene.reader import Reader
 from clvol.scene.records import ConstVolume, GridVolume, Volume
 from clvol.scene.transforms import scale, translate
 from clvol.volumes import dense_from_array, read_vdb, read_volume
+from clvol.volumes.files import place
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
+
+log = logging.getLogger("clvol")
 
 FILTER_TYPES = ("trilinear", "nearest")
 WRAP_MODES = ("clamp", "repeat", "mirror")
@@ -20,7 +26,7 @@ def constvolume(reader: Reader) -> ConstVolume:
     return ConstVolume(reader.color("value", 1.0), reader.transform())
 
 
-def vdbvolume(reader: Reader) -> GridVolume:
+def vdbvolume(reader: Reader) -> Volume:
     """The `vdbvolume` plugin: a grid of an OpenVDB file, under the grid's own transform."""
     if not reader.has("filename"):
         reader.fail("a vdbvolume needs a filename")
@@ -36,7 +42,7 @@ def vdbvolume(reader: Reader) -> GridVolume:
     return _sparse_volume(reader, grid)
 
 
-def gridvolume(reader: Reader) -> GridVolume:
+def gridvolume(reader: Reader) -> Volume:
     """The `gridvolume` plugin: a file, or an array [z, y, x] or [z, y, x, channel].
 
     Samples sit at the centres of equal cells of the unit cube (or of the file's own box) under
@@ -82,8 +88,7 @@ def _grid(reader: Reader) -> Grid:
             hint=" and ".join(sources),
         )
     if sources != ["filename"]:
-        place = reader.node.place(sources[0])
-        return dense_from_array(reader.array(sources[0]), source=place)
+        return dense_from_array(reader.array(sources[0]), source=reader.node.place(sources[0]))
     path = find_parameter(reader, "filename")
     grids = reader.build.grids
     key = (path.resolve(), name or ("density" if path.suffix == ".vdb" else None))
@@ -92,14 +97,22 @@ def _grid(reader: Reader) -> Grid:
     return grids[key]
 
 
-def _sparse_volume(reader: Reader, grid: SparseGrid) -> GridVolume:
-    """A sparse grid in the world: its box is the active box plus one sample on each side."""
+def _sparse_volume(reader: Reader, grid: SparseGrid) -> Volume:
+    """A sparse grid in the world: its box is the active box plus one sample on each side.
+
+    One without active voxels, as the first frames of a simulation have, is 0 everywhere.
+    """
+    to_world = reader.transform() @ grid.index_to_world
+    filter_type = reader.string("filter_type", "trilinear", FILTER_TYPES)
+    if grid.active_voxels == 0 and grid.background == 0:
+        log.warning("%s: has no active voxels, and is 0 everywhere", place(grid.source, grid.name))
+        return ConstVolume((0.0,), to_world)
     return GridVolume(
         grid,
-        reader.transform() @ grid.index_to_world,
+        to_world,
         grid.active_box[0] - 1.0,
         grid.active_box[1] + 1.0,
-        reader.string("filter_type", "trilinear", FILTER_TYPES),
+        filter_type,
         clipped=grid.background == 0,
         source=f"{grid.source}:{grid.name}" if grid.name not in grid.source else grid.source,
     )
@@ -120,3 +133,14 @@ def largest_value(volume: Volume) -> float:
         return float(volume.grid.values.max())
     parts = (volume.grid.leaf_values, volume.grid.tile_values, np.array([volume.grid.background]))
     return float(max(part.max() for part in parts if part.size))
+
+
+def limited(volume: Volume, maximum: float) -> Volume:
+    """The volume with no value above `maximum`."""
+    if isinstance(volume, ConstVolume):
+        return replace(volume, value=tuple(min(value, maximum) for value in volume.value))
+    names = ("values",) if isinstance(volume.grid, DenseGrid) else ("leaf_values", "tile_values")
+    limits = {name: np.minimum(getattr(volume.grid, name), np.float32(maximum)) for name in names}
+    if isinstance(volume.grid, SparseGrid):
+        limits["background"] = min(volume.grid.background, maximum)
+    return replace(volume, grid=replace(volume.grid, **limits))

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from clvol.errors import SceneError
+from clvol.files import other_kind
 from clvol.scene import transforms
 from clvol.scene.files import find
 from clvol.scene.nodes import Node
@@ -26,6 +27,7 @@ from clvol.scene.xml_values import (
     parse_spectrum,
     parse_xyz,
 )
+from clvol.volumes.read import CONVERSIONS, SUFFIXES
 
 PLUGIN_TAGS = (
     *("scene", "shape", "bsdf", "medium", "volume", "phase", "emitter"),
@@ -39,7 +41,6 @@ MAX_TEXT = 2**20
 """Longest attribute after its $names are replaced: defaults made of defaults can grow without end."""
 MAX_FILES = 1000
 """Most files one scene may include, counted as often as they are."""
-VOLUME_SUFFIXES = (".vdb", ".nvdb", ".vol", ".npy", ".npz")
 _NAMELESS = "_arg_"
 _REFERENCE = re.compile(r"(?<!\\)\$(\w*)", re.ASCII)
 
@@ -53,13 +54,16 @@ def read_xml(path: Path, keywords: Mapping[str, object]) -> Node:
         With file and line.
     """
     if not path.is_file():
-        if path.is_dir():
-            raise SceneError(f"'{path}' is a folder, not a scene file", hint="name the .xml file in it")
+        if kind := other_kind(path):
+            hint = "name the .xml file in it" if path.is_dir() else ""
+            raise SceneError(f"'{path}' is {kind}, not a scene file", hint=hint)
         raise SceneError(f"scene file '{path}' does not exist")
-    if path.suffix.lower() in VOLUME_SUFFIXES:
-        raise SceneError(
-            f"'{path}' is a volume, not a scene", hint="`clvol info` shows it; a scene's medium can name it"
-        )
+    if path.suffix.lower() in SUFFIXES:
+        hint = "`clvol info` shows it; a scene's medium can name it"
+        raise SceneError(f"'{path}' is a volume, not a scene", hint=hint)
+    if path.suffix.lower() in CONVERSIONS:
+        hint = CONVERSIONS[path.suffix.lower()]
+        raise SceneError(f"'{path}' is a volume that cannot be read, not a scene", hint=hint)
     reader = _XmlReader(keywords)
     root = reader.file(path, [], "")
     if root.kind != "scene":

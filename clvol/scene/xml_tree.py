@@ -8,6 +8,7 @@ from typing import NoReturn
 from xml.parsers import expat
 
 from clvol.errors import SceneError
+from clvol.files import open_regular
 from clvol.scene.nodes import MAX_DEPTH
 
 
@@ -30,10 +31,8 @@ def parse_elements(path: Path) -> Element:
         With file and line: unreadable, not well-formed, text between elements, a document type with
         entities or an external part, or elements nested deeper than `MAX_DEPTH`.
     """
-    try:
-        text = path.read_bytes()
-    except OSError as error:
-        raise SceneError(f"cannot read the scene file: {error.strerror}", str(path)) from None
+    with open_regular(path, SceneError, "scene file") as file:
+        text = file.read()
     parser = expat.ParserCreate()
     tree = _TreeMaker(path, parser)
     parser.StartElementHandler = tree.start

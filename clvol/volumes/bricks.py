@@ -7,7 +7,6 @@ Bricks that are constant are stored once per value.
 
 from __future__ import annotations
 
-import mmap
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -155,21 +154,9 @@ def _slabs(grid: DenseGrid) -> Iterator[np.ndarray]:
     nz, ny, nx, _ = grid.values.shape
     ys = np.minimum(np.arange(by * BRICK_CELLS + 1), ny - 1)
     xs = np.minimum(np.arange(bx * BRICK_CELLS + 1), nx - 1)
-    mapped = _memory_map(grid.values)
     for z in range(0, bz * BRICK_CELLS, BRICK_CELLS):
         zs = np.minimum(np.arange(z, z + BRICK_EDGE), nz - 1)
-        slab = np.ascontiguousarray(grid.values[zs[0] : zs[-1] + 1])[np.ix_(zs - zs[0], ys, xs)]
-        if mapped is not None:  # pages that were read would stay, a second copy of the volume
-            mapped.madvise(mmap.MADV_DONTNEED)
-        yield slab
-
-
-def _memory_map(values: np.ndarray) -> mmap.mmap | None:
-    """The memory map that an array is a view of, where the system lets its pages be given back."""
-    owner = values
-    while isinstance(owner, np.ndarray):
-        owner = owner.base
-    return owner if isinstance(owner, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED") else None
+        yield grid.values[zs[0] : zs[-1] + 1][np.ix_(zs - zs[0], ys, xs)]
 
 
 def _extrema_dense(grid: DenseGrid) -> tuple[np.ndarray, np.ndarray]:

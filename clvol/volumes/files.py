@@ -1,44 +1,61 @@
-"""Opening the files of volumes: what the operating system refuses becomes a VolumeError."""
+"""Reading the files of volumes: what the operating system refuses becomes a VolumeError."""
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 import numpy.typing as npt
 
 from clvol.errors import VolumeError
+from clvol.files import open_regular
+from clvol.memory import available_memory
 
 TRUNCATED = "the file is truncated or damaged: copy or export it again"
 
-# Bytes a reader may hold in arrays of its own; memory maps do not count.
+# Bytes that a reader may make of a file that is smaller: compressed, or of a shorter type.  A plain one
+# takes its own size.
 MAX_BYTES = 4 << 30
+# Bytes asked of a file at once.
+CHUNK = 4 << 20
+# Bytes from which on the system is asked whether it has them.
+ASKED = 64 << 20
+NANOVDB = "convert this NanoVDB file to OpenVDB: nanovdb_convert FILE.nvdb FILE.vdb"
 
 
 @contextmanager
 def open_binary(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
-    """Open `path` for reading bytes; VolumeError if it is missing, empty, not a file or not readable."""
-    path = Path(path)
-    if path.is_dir():
-        raise VolumeError("is a folder, not a volume file", str(path))
-    try:
-        file = path.open("rb")
-    except FileNotFoundError:
-        raise VolumeError("no such file", str(path)) from None
-    except (OSError, ValueError) as error:
-        raise VolumeError(f"cannot be opened ({error})", str(path)) from None
-    with file:
+    """Open `path` for reading bytes; VolumeError as `open_regular`, and if it is empty."""
+    with open_regular(path, VolumeError, "volume file") as file:
         if os.fstat(file.fileno()).st_size == 0:
             raise VolumeError("the file is empty", str(path), TRUNCATED)
         yield file
 
 
+def fill(array: np.ndarray, file: BinaryIO, where: str) -> None:
+    """Read the bytes of a C-contiguous array; VolumeError if the file has fewer left."""
+    target = memoryview(array.reshape(-1)).cast("B")
+    filled = 0
+    while filled < len(target):
+        got = file.readinto(target[filled : filled + CHUNK])
+        if not got:
+            raise VolumeError(f"its data ends after {filled} of {len(target)} bytes", where, TRUNCATED)
+        filled += got
+
+
 def allocate(shape: int | tuple[int, ...], dtype: npt.DTypeLike, where: str) -> np.ndarray:
     """An uninitialised array; VolumeError if the machine lacks the memory."""
+    count = math.prod(shape) if isinstance(shape, tuple) else shape
+    needed, free = count * np.dtype(dtype).itemsize, None
+    if needed > ASKED:
+        free = available_memory()
+    if free is not None and needed > free:
+        what = f"{needed} bytes of memory are needed, {free} are free"
+        raise VolumeError(what, where, "use a smaller grid")
     try:
         return np.empty(shape, dtype)
     except MemoryError as error:

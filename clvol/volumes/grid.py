@@ -15,8 +15,8 @@ import numpy as np
 class DenseGrid:
     """Samples on a full lattice.
 
-    `values` is float32 (nz, ny, nx, channels), C order, possibly a read-only memory map; sample
-    (i, j, k) is ``values[k, j, i]``.  `box` is the file's own bounding box, float64
+    `values` is float32 (nz, ny, nx, channels), C order, read-only; sample (i, j, k) is
+    ``values[k, j, i]``.  `box` is the file's own bounding box, float64
     (2, 3) in x, y, z order (the unit cube where a format has none).
     """
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import os
 import re
@@ -14,8 +15,11 @@ from typing import BinaryIO
 import numpy as np
 
 from clvol.errors import VolumeError
-from clvol.volumes.files import MAX_BYTES, TRUNCATED, allocate, open_binary, place
+from clvol.masks import as_array, masked_count
+from clvol.volumes.files import CHUNK, MAX_BYTES, TRUNCATED, allocate, fill, open_binary, place
 from clvol.volumes.grid import DenseGrid
+
+log = logging.getLogger("clvol")
 
 NPY_MAGIC = b"\x93NUMPY"
 # NumPy's own limit for headers of plain arrays.
@@ -31,34 +35,49 @@ def dense_from_array(array: object, name: str = "", source: str = "") -> DenseGr
     Parameters
     ----------
     array : array-like [z, y, x] or [z, y, x, channel] of integers, booleans or real floats, 1 or 3
-        channels.  C-order float32 is kept without a copy, all else becomes float32.
+        channels.  It is copied, as float32, so that what is done to it later does not reach the grid.
+        Masked samples have no value, and become 0, which a warning counts.
     name, source : what error messages call it.
 
     Raises VolumeError for other shapes and types.
     """
     where = place(source, name)
     try:
-        values = np.asarray(array)
+        given = as_array(array)
     except (TypeError, ValueError) as error:
         raise VolumeError(f"is not an array ({error})", where) from None
-    _check_layout(values.dtype, values.shape, where)
-    if values.ndim == 3:
-        values = values[..., None]
+    check_layout(given.dtype, given.shape, where)
+    values = allocate(given.shape, np.float32, where)
     # A double beyond float32 becomes infinite, and is reported as such when the values are checked.
     with np.errstate(over="ignore", invalid="ignore"):
-        values = np.ascontiguousarray(values, dtype=np.float32)
-    box = np.array([[0, 0, 0], [1, 1, 1]], np.float64)
-    return DenseGrid(values=values, box=box, name=name, source=source)
+        values[...] = np.ma.getdata(given)
+    masked = masked_count(given)
+    if masked:
+        values[np.ma.getmaskarray(given)] = 0
+        log.warning("%s: %d of %d samples are masked, and taken as 0", where, masked, values.size)
+    return _grid(values, name, source)
 
 
-def _check_layout(dtype: np.dtype, shape: tuple[int, ...], where: str) -> None:
+def _grid(values: np.ndarray, name: str, source: str) -> DenseGrid:
+    """Samples that nobody else holds as a grid on the unit cube."""
+    values = values[..., None] if values.ndim == 3 else values
+    values.flags.writeable = False
+    return DenseGrid(values, np.array([[0, 0, 0], [1, 1, 1]], np.float64), name, source)
+
+
+def check_layout(dtype: np.dtype, shape: tuple[int, ...], where: str) -> None:
+    """VolumeError unless an array can be a grid: real numbers, [z, y, x] or [z, y, x, 1 or 3], not empty."""
     if dtype.kind not in "biuf":
         raise VolumeError(f"an array of {dtype} is not supported, real numbers are", where)
     if len(shape) not in (3, 4):
         axes = f"an array of {len(shape)} axes, shape {shape}, is not supported"
         raise VolumeError(axes, where, "give it the axes [z, y, x] or [z, y, x, channel]")
     if len(shape) == 4 and shape[3] not in (1, 3):
-        raise VolumeError(f"{shape[3]} channels are not supported, 1 and 3 are", where)
+        hint = "give one array [z, y, x] at a time, such as array[0]"
+        if shape[0] in (1, 3):
+            hint = "put the channels last: numpy.moveaxis(array, 0, -1)"
+        last = f"an array of shape {shape} is no [z, y, x, channel]: the last axis has 1 or 3 channels"
+        raise VolumeError(f"{last}, not {shape[3]}", where, hint)
     if 0 in shape:
         raise VolumeError(f"an array of shape {shape} has no samples", where)
 
@@ -70,9 +89,10 @@ def read_numpy(
 
     Parameters
     ----------
-    path : a .npy file (C-order float32 stays a read-only memory map) or a .npz file.
+    path : a .npy or a .npz file.
     grid : which array of a .npz, needed only where there are several.
-    max_bytes : what reading may hold in memory, memory maps not counted.
+    max_bytes : what the samples may take in memory, where the file does not store them as they are kept,
+        C-order float32.
 
     Raises VolumeError for a missing or damaged file, objects (pickles are never loaded), arrays that
     `dense_from_array` refuses, and more than `max_bytes`.
@@ -102,9 +122,7 @@ def _read_npy(file: BinaryIO, path: str | os.PathLike[str], max_bytes: int) -> D
         )
     if fortran or dtype != np.float32:
         _check_memory(4 * count, max_bytes, where)
-    order = "F" if fortran else "C"
-    mapped = np.memmap(file, dtype, mode="r", offset=file.tell(), shape=shape, order=order)
-    return dense_from_array(mapped, name, where)
+    return _grid(_read_samples(file, dtype, shape, fortran, where), name, where)
 
 
 def _read_npz(file: BinaryIO, path: str | os.PathLike[str], grid: str | None, max_bytes: int) -> DenseGrid:
@@ -128,7 +146,7 @@ def _read_npz(file: BinaryIO, path: str | os.PathLike[str], grid: str | None, ma
                 values = _read_member(data, member, where, max_bytes)
     except ZIP_ERRORS as error:
         raise VolumeError(f"the archive is damaged ({error})", where, TRUNCATED) from None
-    return dense_from_array(values, name, str(path))
+    return _grid(values, name, str(path))
 
 
 def _choose_array(names: list[str], grid: str | None, where: str) -> str:
@@ -150,16 +168,28 @@ def _read_member(data: BinaryIO, member: zipfile.ZipInfo, where: str, max_bytes:
             where,
             TRUNCATED,
         )
-    _check_memory(nbytes if dtype == np.float32 and not fortran else nbytes + 4 * count, max_bytes, where)
-    values = allocate(count, dtype, where)
-    target = memoryview(values).cast("B")
-    filled = 0
-    while filled < nbytes:
-        got = data.readinto(target[filled : filled + (1 << 20)])
-        if not got:
-            raise VolumeError(f"its data ends after {filled} of {nbytes} bytes", where, TRUNCATED)
-        filled += got
-    return values.reshape(shape, order="F" if fortran else "C")
+    _check_memory(4 * count, max_bytes, where)
+    return _read_samples(data, dtype, shape, fortran, where)
+
+
+def _read_samples(
+    file: BinaryIO, dtype: np.dtype, shape: tuple[int, ...], fortran: bool, where: str
+) -> np.ndarray:
+    """The array at the file's position as C-order float32, some planes of another type or order at a time."""
+    values = allocate(shape, np.float32, where)
+    if dtype == np.float32 and not fortran:
+        fill(values, file, where)
+        return values
+    target = values.T if fortran else values
+    planes = max(CHUNK // (dtype.itemsize * math.prod(target.shape[1:])), 1)
+    for first in range(0, len(target), planes):
+        part = target[first : first + planes]
+        stored = np.empty(part.shape, dtype)
+        fill(stored, file, where)
+        # A double beyond float32 becomes infinite, and is reported as such when the values are checked.
+        with np.errstate(over="ignore", invalid="ignore"):
+            part[...] = stored
+    return values
 
 
 def _check_memory(nbytes: int, max_bytes: int, where: str) -> None:
@@ -167,7 +197,7 @@ def _check_memory(nbytes: int, max_bytes: int, where: str) -> None:
         raise VolumeError(
             f"{nbytes} bytes of memory are needed, the limit is {max_bytes}",
             where,
-            "store it as a C-order float32 .npy, which is not copied, or raise max_bytes",
+            "store it as a C-order float32 .npy, or raise max_bytes",
         )
 
 
@@ -201,5 +231,5 @@ def _read_header(file: BinaryIO, where: str) -> tuple[np.dtype, tuple[int, ...],
     except TypeError as error:
         raise VolumeError(f"its NumPy header is damaged ({error})", where, TRUNCATED) from None
     sizes = tuple(int(size) for size in re.findall(r"\d+", shape[1]))
-    _check_layout(dtype, sizes, where)
+    check_layout(dtype, sizes, where)
     return dtype, sizes, order[1] == "True"

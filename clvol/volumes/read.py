@@ -6,12 +6,16 @@ import os
 from pathlib import Path
 
 from clvol.errors import VolumeError
+from clvol.files import other_kind
+from clvol.volumes.files import NANOVDB
 from clvol.volumes.grid import Grid
 from clvol.volumes.numpy_files import read_numpy
 from clvol.volumes.vdb import read_vdb
 from clvol.volumes.vol import read_vol
 
-SUPPORTED = (".vdb", ".vol", ".npy", ".npz")
+SUFFIXES = (".vdb", ".vol", ".npy", ".npz")
+CONVERSIONS = {".nvdb": NANOVDB}
+"""Suffixes of volumes that cannot be read, and what makes one of them that can."""
 
 
 def read_volume(path: str | os.PathLike[str], grid: str | None = None) -> Grid:
@@ -30,12 +34,13 @@ def read_volume(path: str | os.PathLike[str], grid: str | None = None) -> Grid:
     if suffix in (".npy", ".npz"):
         return read_numpy(path, grid)
     if suffix != ".vol":
-        hint = "convert it to OpenVDB" if suffix == ".nvdb" else ""
-        listed = f"{', '.join(SUPPORTED[:-1])} and {SUPPORTED[-1]}"
-        if Path(path).is_dir():
-            raise VolumeError("is a folder", str(path), f"give a file: {listed} can be read")
+        listed = f"{', '.join(SUFFIXES[:-1])} and {SUFFIXES[-1]}"
+        if kind := other_kind(path):
+            raise VolumeError(
+                f"is {kind}, not a volume file", str(path), f"give a file: {listed} can be read"
+            )
         what = f"files ending in {suffix!r}" if suffix else "files without a suffix"
-        raise VolumeError(f"{what} cannot be read, {listed} can", str(path), hint)
+        raise VolumeError(f"{what} cannot be read, {listed} can", str(path), CONVERSIONS.get(suffix, ""))
     if grid is not None:
         raise VolumeError(f"a .vol file has no grid named {grid!r}", str(path), "leave the name out")
     return read_vol(path)

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from dataclasses import dataclass
 
 import numpy as np
 
+from clvol.errors import VolumeError
 from clvol.volumes.files import MAX_BYTES, place
 from clvol.volumes.grid import SparseGrid
 from clvol.volumes.vdb_header import (
     COMPRESSION_NAMES,
     Descriptor,
     check_transform,
+    grid_name,
     read_descriptors,
     read_file_header,
     read_grid_header,
 )
 from clvol.volumes.vdb_stream import VdbStream, open_vdb
 from clvol.volumes.vdb_tree import VdbTree
+
+log = logging.getLogger("clvol")
 
 # OpenVDB's names of the voxel types that convert to float32, with the letters of struct and NumPy.
 VALUE_TYPES = {"float": "f", "double": "d", "int32": "i", "int64": "q"}
@@ -28,10 +33,12 @@ VALUE_TYPES = {"float": "f", "double": "d", "int32": "i", "int64": "q"}
 class VdbGridInfo:
     """What a file says about one grid without its tree.
 
+    name : "density", or "density[1]" for the second of that name.
     value_type : "float", "vec3s", …; half : values stored as 16-bit floats.
     compression : any of "zip", "blosc", "active mask".
     active_box : int32 (2, 3), inclusive, and active_voxels : from the grid's metadata, None if absent.
     transform : OpenVDB's name of the map; index_to_world : float64 (4, 4), None if it is not affine.
+    parent : name of the grid whose tree it shares, or "".
     """
 
     name: str
@@ -42,6 +49,16 @@ class VdbGridInfo:
     active_voxels: int | None
     transform: str
     index_to_world: np.ndarray | None
+    parent: str
+
+    @property
+    def unreadable(self) -> str:
+        """Why `read_vdb` has no use for the grid; "" where it has."""
+        if self.value_type not in VALUE_TYPES:
+            return f"its values are {self.value_type}: those of {', '.join(VALUE_TYPES)} grids can be read"
+        if self.index_to_world is None:
+            return f"its transform is a {self.transform}: affine ones can be read"
+        return ""
 
 
 def list_vdb(path: str | os.PathLike[str]) -> list[VdbGridInfo]:
@@ -50,7 +67,9 @@ def list_vdb(path: str | os.PathLike[str]) -> list[VdbGridInfo]:
     Raises VolumeError if the file is not OpenVDB 222–224 or its directory is damaged.
     """
     with open_vdb(path) as stream:
-        descriptors = list(read_descriptors(stream, read_file_header(stream)))
+        descriptors, damage = _directory(stream)
+        if damage:
+            raise damage
         grids = []
         for descriptor in descriptors:
             header = read_grid_header(stream, descriptor)
@@ -65,20 +84,22 @@ def list_vdb(path: str | os.PathLike[str]) -> list[VdbGridInfo]:
                     active_voxels=header.active_voxels,
                     transform=header.transform,
                     index_to_world=header.index_to_world,
+                    parent=grid_name(descriptor.parent),
                 )
             )
     return grids
 
 
 def read_vdb(
-    path: str | os.PathLike[str], grid: str = "density", *, max_bytes: int = MAX_BYTES
+    path: str | os.PathLike[str], grid: str | int = "density", *, max_bytes: int = MAX_BYTES
 ) -> SparseGrid:
     """One scalar grid of an OpenVDB file.
 
     Parameters
     ----------
     path : a .vdb file, versions 222–224 (225 with a warning).
-    grid : its name; of several grids with the same name, the first in the file.
+    grid : its name, or its number in the file's order, from 0.  Grids of the same name are told apart as
+        OpenVDB does, "density[0]", "density[1]", …; the plain name is the first of them, with a warning.
     max_bytes : what the returned arrays may take; a file that needs more is refused before they exist.
 
     Raises
@@ -119,25 +140,52 @@ def read_vdb(
     )
 
 
-def find_grid(stream: VdbStream, name: str) -> tuple[Descriptor, Descriptor]:
-    """The directory's entries of the grid, and of the grid whose tree it uses (itself or its parent)."""
-    seen: list[Descriptor] = []
-    found = None
-    for descriptor in read_descriptors(stream, read_file_header(stream)):
-        seen.append(descriptor)
-        if found is None and name in (descriptor.name, descriptor.unique_name):
-            found = descriptor
-        if found is None:
-            continue
-        if not found.parent:
-            return found, found
-        for other in seen:
-            if other.unique_name == found.parent and not other.parent:
-                return found, other
-    if found is not None:
-        stream.fail(f"grid {found.name!r} shares the tree of {found.parent!r}, which the file lacks")
-    names = ", ".join(repr(descriptor.name) for descriptor in seen)
-    stream.fail(f"has no grid {name!r}", f"its grids are {names}" if names else "it has no grids at all")
+def find_grid(stream: VdbStream, grid: str | int) -> tuple[Descriptor, Descriptor]:
+    """The directory's entries of the grid, and of the grid whose tree it uses (itself or its parent).
+
+    `grid` : its name or number; of several grids with one name, that name is the first, with a warning.
+    """
+    entries, damage = _directory(stream)
+    found = _named(stream, entries, grid) if isinstance(grid, str) else entries[grid : grid + 1]
+    if found:
+        parent = found[0].parent
+        for entry in found if not parent else entries:
+            if not parent or (entry.unique_name == parent and not entry.parent):
+                return found[0], entry
+    if damage:
+        raise damage
+    if found:
+        stream.fail(f"grid {found[0].name!r} shares the tree of {parent!r}, which the file lacks")
+    names = ", ".join(repr(entry.name) for entry in entries)
+    stream.fail(f"has no grid {grid!r}", f"its grids are {names}" if names else "it has no grids at all")
+
+
+def _directory(stream: VdbStream) -> tuple[list[Descriptor], VolumeError | None]:
+    """The directory's entries, up to where the file is cut or damaged if it is, and what is wrong there."""
+    count = read_file_header(stream)
+    entries = []
+    try:
+        for entry in read_descriptors(stream, count):
+            entries.append(entry)
+    except VolumeError as error:
+        return entries, error
+    return entries, None
+
+
+def _named(stream: VdbStream, entries: list[Descriptor], name: str) -> list[Descriptor]:
+    """Those entries that a name means, the first of which is taken.  "density[0]" is the first "density"."""
+    exact = [entry for entry in entries if name in (entry.name, entry.unique_name)]
+    alike = [entry for entry in entries if entry.plain_name == name]
+    if len(alike) > 1:
+        names = ", ".join([f"{name}[0]", *(entry.name for entry in alike[1:])])
+        log.warning(
+            "%s: has %d grids named %r; the first is taken, choose by %s",
+            stream.where,
+            len(alike),
+            name,
+            names,
+        )
+    return exact or alike or [entry for entry in entries if f"{entry.name}[0]" == name]
 
 
 def _value_code(stream: VdbStream, descriptor: Descriptor) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import struct
 import warnings
@@ -10,11 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from clvol.volumes.files import NANOVDB
 from clvol.volumes.vdb_stream import ACTIVE_MASK, BLOSC, ZIP, VdbStream
 
-MAGIC = 0x56444220
+MAGIC = struct.pack("<q", 0x56444220)
 OLDEST_VERSION, NEWEST_VERSION, WARNED_VERSION = 222, 224, 225
 UUID_BYTES = 36
+# Between a name and the number that tells grids of that name apart.
+SUFFIX = "\x1e"
 # Smallest bytes an entry can take: bounds on counts before any loop starts.
 SMALLEST_GRID, SMALLEST_METADATUM = 36, 12
 
@@ -31,16 +35,25 @@ COMPRESSION_NAMES = {ZIP: "zip", ACTIVE_MASK: "active mask", BLOSC: "blosc"}
 class Descriptor:
     """One entry of the file's directory of grids.
 
-    `unique_name` still carries the suffix after 0x1e that tells grids of the same name apart;
-    positions are in bytes from the start of the file.
+    `unique_name` still carries the suffix after 0x1e that tells grids of the same name apart; `parent` is
+    that of the grid whose tree this one shares, or ""; positions are in bytes from the start of the file.
     """
 
-    name: str
     unique_name: str
     grid_type: str
     parent: str
     grid_pos: int
     end_pos: int
+
+    @property
+    def plain_name(self) -> str:
+        """The name that several grids of a file may have."""
+        return self.unique_name.split(SUFFIX)[0]
+
+    @property
+    def name(self) -> str:
+        """The name that only this grid has."""
+        return grid_name(self.unique_name)
 
     @property
     def half(self) -> bool:
@@ -52,6 +65,12 @@ class Descriptor:
         """Name of the voxel type: "float", "vec3s", …; the whole type for other trees than 5-4-3."""
         found = re.fullmatch(r"Tree_(\w+)_5_4_3", self.grid_type.removesuffix("_HalfFloat"))
         return found[1] if found else self.grid_type
+
+
+def grid_name(unique_name: str) -> str:
+    """A unique name in OpenVDB's way: the second "density" is "density[1]"."""
+    plain, _, number = unique_name.partition(SUFFIX)
+    return f"{plain}[{number}]" if number not in ("", "0") else plain
 
 
 @dataclass(frozen=True)
@@ -67,7 +86,10 @@ class GridHeader:
 
 def read_file_header(stream: VdbStream) -> int:
     """Check magic and version, step over the file's metadata; the number of grids."""
-    if stream.end < 8 or stream.unpack("<q")[0] != MAGIC:
+    magic = stream.take(min(stream.end, 8))
+    if magic.startswith(b"NanoVDB"):
+        stream.fail("is not an OpenVDB file", NANOVDB)
+    if magic != MAGIC:
         stream.fail("is not an OpenVDB file (wrong magic number)", "")
     (version,) = stream.unpack("<I")
     if version == WARNED_VERSION:
@@ -114,13 +136,20 @@ def read_descriptors(stream: VdbStream, count: int) -> Iterator[Descriptor]:
 
     Entries lie between the grids, so a file that is cut after a grid still gives the grids before.
     """
+    taken: set[str] = set()
     for _ in range(count):
         unique_name, grid_type, parent = stream.string(), stream.string(), stream.string()
         grid_pos, block_pos, end_pos = stream.unpack("<3q")
-        name = unique_name.split("\x1e")[0]
-        if not stream.pos <= grid_pos <= block_pos <= end_pos:
-            stream.fail(f"grid {name!r} has offsets {grid_pos}, {block_pos}, {end_pos} at byte {stream.pos}")
-        yield Descriptor(name, unique_name, grid_type, parent, grid_pos, end_pos)
+        # A grid that shares another one's tree has no blocks, and their offset means nothing.
+        if not (stream.pos <= grid_pos <= end_pos and (parent or grid_pos <= block_pos <= end_pos)):
+            where = f"offsets {grid_pos}, {block_pos}, {end_pos} at byte {stream.pos}"
+            stream.fail(f"grid {unique_name!r} has {where}")
+        if unique_name in taken:  # not by OpenVDB, which numbers them
+            unique_name = next(
+                n for k in itertools.count(1) if (n := f"{unique_name}{SUFFIX}{k}") not in taken
+            )
+        taken.add(unique_name)
+        yield Descriptor(unique_name, grid_type, parent, grid_pos, end_pos)
         stream.seek(end_pos)
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import mmap
 import os
 import struct
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import NoReturn
+from typing import BinaryIO, NoReturn
 
 import blosc
 from blosc.blosc_extension import error as BloscError  # noqa: N812
@@ -19,17 +18,22 @@ from clvol.volumes.files import TRUNCATED, open_binary
 ZIP, ACTIVE_MASK, BLOSC = 1, 2, 4
 BLOSC_FORMAT = 2
 BLOSC_HEADER = struct.Struct("<BBBBIII")
+# Bytes read at once: many nodes, and little beside what their values take.
+WINDOW = 1 << 18
 
 
 class VdbStream:
-    """A cursor over `data` (bytes or a memory map); every read past its end is a VolumeError.
+    """A cursor over a file's bytes, of which a window is in memory; every read past its end is a VolumeError.
 
+    The file is read rather than mapped: one that another program cuts short meanwhile ends in an error
+    then, a map of it in a signal that kills the process.
     `where` names the file, and the grid once it is known, in the errors.
     """
 
-    def __init__(self, data: bytes | mmap.mmap, where: str) -> None:
-        self.data, self.where = data, where
-        self.pos, self.end = 0, len(data)
+    def __init__(self, file: BinaryIO, where: str) -> None:
+        self.file, self.where = file, where
+        self.pos, self.end = 0, file.seek(0, os.SEEK_END)
+        self._window, self._first = b"", 0
 
     def fail(self, what: str, hint: str = TRUNCATED) -> NoReturn:
         """Raise a VolumeError for this file."""
@@ -53,19 +57,28 @@ class VdbStream:
 
     def take(self, count: int) -> bytes:
         """The next `count` bytes."""
-        pos = self.pos
-        if not 0 <= count <= self.end - pos:
-            self.require(count)
-        self.pos = pos + count
-        return self.data[pos : self.pos]
+        at = self._locate(count)
+        self.pos += count
+        return self._window[at : at + count]
 
     def unpack(self, layout: str) -> tuple:
         """The next values, by a `struct` layout (little-endian as OpenVDB writes)."""
         size = struct.calcsize(layout)
-        self.require(size)
-        values = struct.unpack_from(layout, self.data, self.pos)
+        at = self._locate(size)
         self.pos += size
-        return values
+        return struct.unpack_from(layout, self._window, at)
+
+    def _locate(self, count: int) -> int:
+        """Where in the window the next `count` bytes are, which is moved to hold them."""
+        self.require(count)
+        at = self.pos - self._first
+        if 0 <= at <= len(self._window) - count:
+            return at
+        self.file.seek(self.pos)
+        self._window, self._first = self.file.read(min(max(count, WINDOW), self.end - self.pos)), self.pos
+        if len(self._window) < count:
+            self.fail(f"{count} bytes at byte {self.pos} are gone since it was opened")
+        return 0
 
     def string(self) -> str:
         """A string after its 32-bit length; bytes that are not UTF-8 are replaced."""
@@ -133,11 +146,6 @@ def decompress_blosc(payload: bytes, nbytes: int) -> bytes:
 
 @contextmanager
 def open_vdb(path: str | os.PathLike[str]) -> Iterator[VdbStream]:
-    """A stream over the memory-mapped file, closed at the end."""
+    """A stream over the file, closed at the end."""
     with open_binary(path) as file:
-        try:
-            data = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-        except (OSError, ValueError) as error:
-            raise VolumeError(f"cannot be mapped into memory ({error})", str(path)) from None
-        with data:
-            yield VdbStream(data, str(path))
+        yield VdbStream(file, str(path))

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from clvol.errors import VolumeError
+from clvol.masks import masked_count
 from clvol.output_files import replacing
-from clvol.volumes.files import TRUNCATED, open_binary
+from clvol.volumes.files import TRUNCATED, allocate, fill, open_binary
 from clvol.volumes.grid import DenseGrid
 
 # "VOL", version, type of the samples, nx ny nz channels, box.
@@ -19,7 +20,7 @@ VERSION, FLOAT32 = 3, 1
 
 
 def read_vol(path: str | os.PathLike[str]) -> DenseGrid:
-    """A .vol file (version 3, float32, 1 or 3 channels) as a read-only memory map; nothing is copied.
+    """A .vol file (version 3, float32, 1 or 3 channels).
 
     Bytes after the samples are ignored, as Mitsuba does.  Raises VolumeError for a missing, damaged
     or truncated file, other versions and types, and 6 channels.
@@ -45,7 +46,9 @@ def read_vol(path: str | os.PathLike[str]) -> DenseGrid:
         box = np.array(corners, np.float64).reshape(2, 3)
         if not (np.isfinite(box).all() and (box[0] < box[1]).all()):
             raise VolumeError(f"its box {box.tolist()} is empty or not finite", where)
-        values = np.memmap(file, "<f4", mode="r", offset=HEADER.size, shape=(nz, ny, nx, channels))
+        values = allocate((nz, ny, nx, channels), "<f4", where)
+        fill(values, file, where)
+    values.flags.writeable = False
     return DenseGrid(values=values, box=box, name=Path(path).stem, source=where)
 
 
@@ -68,9 +71,14 @@ def write_vol(path: str | os.PathLike[str], values: np.ndarray, box: np.ndarray)
     values : real array (nz, ny, nx) or (nz, ny, nx, channels) with 1 or 3 channels; stored as float32.
     box : (2, 3), lower and upper corner in x, y, z order, used by Mitsuba with use_grid_bbox = true.
 
-    Raises VolumeError for other shapes and an empty box, OptionError where the file cannot be written.
+    Raises VolumeError for other shapes, masked samples and an empty box, OptionError where the file cannot
+    be written.
     """
     where = str(path)
+    if masked_count(values):
+        raise VolumeError(
+            f"{masked_count(values)} samples are masked", where, "give them values: array.filled(0)"
+        )
     values = np.asarray(values)
     if values.ndim == 3:
         values = values[..., None]
