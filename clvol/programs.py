@@ -74,6 +74,8 @@ def stage_headers(config: KernelConfig, stage: str) -> list[str]:
         if chosen.walks_majorant:
             headers.append(registry.MAJORANTS[config.majorant].header)
         headers.append(chosen.header)
+        if emits:
+            headers.append("tracking/thin_emission.h")
     if walks and features.homogeneous:
         analytic = "homogeneous" if stage == "medium_sample" else "homogeneous_transmittance"
         headers.append(f"tracking/{analytic}.h")

@@ -11,6 +11,14 @@ INLINE bool medium_collision(const MediumRay *in, uint4 k, Tally *tally, Collisi
         return homogeneous_collision(in, k.x, &stream, tally, collision);
 #endif
 #if CLVOL_HAS_HETEROGENEOUS
+#if CLVOL_EMISSION_ON_WALKS
+    if (is_thin(in)) {
+        const Spectrum emission = collision->emission + thin_emission(in, k.x, &stream, tally, collision->beta);
+        const bool collided = sample_collision(in, k.x, &stream, tally, collision);
+        collision->emission = emission; /* instead of what the walk met */
+        return collided;
+    }
+#endif
     return sample_collision(in, k.x, &stream, tally, collision);
 #endif
 }

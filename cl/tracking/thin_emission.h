@@ -1,0 +1,45 @@
+/* Emission of a stretch so thin that hardly a walk meets an event in it: gathered at one point of the stretch, drawn
+   evenly, instead of at tentative collisions.
+
+   Estimates the integral of T sigma_a L_e over the stretch, with the transmittance to the point by ratio tracking
+   under the medium's global bound: unbiased for any bound, and of finite relative variance however thin. */
+#ifndef CLVOL_TRACKING_THIN_EMISSION_H
+#define CLVOL_TRACKING_THIN_EMISSION_H
+#include "tracking/collision.h"
+#include "tracking/walk.h"
+
+/* Optical depth under the global bound up to which a stretch is thin: ratio tracking then seldom looks up. */
+#define THIN_DEPTH 0.3f
+/* Tentative collisions before the point, of which most stretches have none, beyond which an estimate is given up. */
+#define THIN_BUDGET 64u
+
+INLINE float global_rate(const MediumRay *in)
+{
+    return in->rate * in->medium->majorant;
+}
+
+INLINE bool is_thin(const MediumRay *in)
+{
+    return global_rate(in) * in->t_max <= THIN_DEPTH;
+}
+
+/* `first` places the point: it may also decide the flight, since sums keep their mean whatever they share. */
+INLINE Spectrum thin_emission(const MediumRay *in, uint first, Stream *stream, Tally *tally, Spectrum beta)
+{
+    const float rate = global_rate(in), t = uniform_float(first) * in->t_max;
+    if (!(rate > 0.0f))
+        return (Spectrum)(0.0f);
+    float at = exponential_variate(stream_pair(stream).x) / rate;
+    for (uint n = 0; at < t; ++n) {
+        beta *= 1.0f - extinction_at(in, in->ray.o + at * in->ray.d, stream, tally) / rate;
+        at += exponential_variate(stream_pair(stream).x) / rate;
+        if (n == THIN_BUDGET) {
+            tally->exhausted += 1;
+            return (Spectrum)(0.0f);
+        }
+    }
+    const Extinction depth = extinction_at(in, in->ray.o + t * in->ray.d, stream, tally) * in->t_max;
+    return beta * depth * medium_source(in->scene, in->medium, in->world.o + t * in->world.d, in->channel);
+}
+
+#endif
