@@ -27,6 +27,7 @@ from clvol.cli_options import (
     positive_option,
     quiet_option,
     step_option,
+    tell,
 )
 from clvol.cli_ray import ray
 from clvol.cli_selftest import selftest
@@ -181,7 +182,7 @@ def render(
         click.echo(f"clvol: interrupted after {result.samples[1]} spp, saved what there is", err=True)
     if not quiet:
         written = [output for output in outputs if output not in failures]
-        click.echo("\n".join(_summary(result, written)))
+        tell(_summary(result, written))
     for failure in failures.values():
         raise failure
     click.get_current_context().exit(INTERRUPTED if interrupted else 0)
@@ -194,9 +195,8 @@ def _logging_to(console: Console, verbose: bool) -> Iterator[None]:
     class ConsoleHandler(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
             prefix = f"clvol: {record.levelname.lower()}: " if record.levelno >= logging.WARNING else ""
-            console.print(
-                prefix + self.format(record), markup=False, highlight=False, emoji=False, soft_wrap=True
-            )
+            line = printable(prefix + self.format(record))
+            console.print(line, markup=False, highlight=False, emoji=False, soft_wrap=True)
 
     logger, handler = logging.getLogger("clvol"), ConsoleHandler()
     earlier = logger.level
@@ -254,7 +254,7 @@ def info(file: str, grid: str | None, definitions: tuple[tuple[str, str], ...]) 
         if definitions:
             raise click.UsageError("-D fills a scene's $NAMES, and this is a volume file")
         lines = describe.describe_volume(file, grid)
-    click.echo("\n".join(printable(line) for line in lines))
+    tell(lines)
 
 
 @main.command()

@@ -15,6 +15,7 @@ from clvol.cli_options import (
     device_option,
     positive_option,
     quiet_option,
+    tell,
 )
 
 EXAMPLES = """
@@ -139,7 +140,7 @@ def compare(
             f"clvol: interrupted after {comparison.about['rounds']} rounds, saved what there is", err=True
         )
     if not quiet:
-        click.echo("\n".join([repr(comparison), "", *comparison.words, "", f"{output}: report.html"]))
+        tell([repr(comparison), "", *comparison.words, "", f"{output}: report.html"])
     click.get_current_context().exit(INTERRUPTED if comparison.interrupted else 0)
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NoReturn
 
 import click
@@ -32,6 +33,8 @@ class OneLineErrors(click.Group):
         """Run the command as `click.Group.main` does, and exit; without `standalone_mode`, return."""
         if not standalone_mode:
             return super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
+        if isinstance(sys.stdout, io.TextIOWrapper):  # whatever the encoding, a summary is no reason to fail
+            sys.stdout.reconfigure(errors="backslashreplace")
         try:
             status = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
         except click.UsageError as error:
@@ -57,6 +60,11 @@ def fail(message: str, whole: bool = False) -> NoReturn:
     line = message if whole else printable(shortened(" ".join(message.split()), LONGEST_LINE))
     click.echo(f"clvol: error: {line}", err=True)
     sys.exit(USER_ERROR)
+
+
+def tell(lines: Iterable[str]) -> None:
+    """Print lines on standard output, whatever names are in them."""
+    click.echo("\n".join(printable(line) for text in lines for line in text.split("\n")))
 
 
 def _usage_message(error: click.UsageError) -> str:

@@ -16,6 +16,7 @@ from clvol.cli_options import (
     majorant_scale_option,
     quiet_option,
     step_option,
+    tell,
 )
 
 EXAMPLES = """
@@ -122,7 +123,7 @@ def ray(
         for output in outputs:
             view.save(output)
     if not quiet:
-        click.echo("\n".join([", ".join(outputs), *view.summary()]))
+        tell([", ".join(outputs), *view.summary()])
 
 
 @contextmanager

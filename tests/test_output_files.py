@@ -273,3 +273,22 @@ def test_a_file_keeps_its_mode_and_a_new_one_has_that_of_any_other(tmp_path: Pat
         os.umask(earlier)
     modes = {path.name: stat.S_IMODE(path.stat().st_mode) for path in tmp_path.iterdir()}
     assert modes == {"new": 0o640, "old": 0o604}
+
+
+# --- what is printed -------------------------------------------------------------------------------
+
+
+def test_names_are_printed_without_commanding_the_terminal(scene: Path, rendered: Callable) -> None:
+    rendered(lambda: None)
+    output = scene.with_name(os.fsdecode(b"a\xff\x1b[31m.png"))
+    outcome = CliRunner().invoke(main, ["render", str(scene), "-o", str(output)])
+    assert outcome.exit_code == 0 and r"a\udcff\x1b[31m.png" in outcome.stdout
+    outcome = CliRunner().invoke(main, ["render", "\x1b[31m.xml", "-o", str(output)], color=True)
+    assert outcome.exit_code == 2 and r"\x1b[31m.xml" in outcome.stderr and "\x1b" not in outcome.stderr
+
+
+def test_a_narrow_encoding_of_the_terminal_is_no_failure(scene: Path, rendered: Callable) -> None:
+    rendered(lambda: None)
+    output = scene.with_name("\N{EM DASH}.png")
+    outcome = CliRunner(charset="latin-1").invoke(main, ["render", str(scene), "-o", str(output)])
+    assert outcome.exit_code == 0 and r"\u2014.png: 64 x 64 pixels" in outcome.stdout

@@ -4,6 +4,7 @@ device functions, and agree with float64."""
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -247,6 +248,14 @@ def test_the_figure_shows_every_choice(view):
 
 
 # -- what a user meets --------------------------------------------------------------------------------
+
+
+def test_any_name_of_a_scene_is_drawn(view, tmp_path):
+    """Not as a formula, and bytes that are no text as escapes."""
+    named = replace(view, scene="$x^\udcff$.xml", watched=(*view.watched[:1], *view.watched[-1:]))
+    named.save(tmp_path / "ray.svg")
+    title = draw(named).get_suptitle()
+    assert title.startswith(r"$x^\udcff$.xml, ray through pixel (3, 5)")
 
 
 def test_homogeneous_media_are_followed_in_closed_form_and_saved(tmp_path):

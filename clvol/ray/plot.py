@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from clvol.errors import printable
 from clvol.ray.view import CHANNEL_NAMES
 from clvol.ray.walks import UNNAMED, Walk, Watched, format_estimate
 
@@ -41,7 +42,7 @@ def draw(view: RayView) -> Figure:
     for row, watched in enumerate(view.watched):
         first = _walks_panel(figure, panels[row], view, watched, first, row == rows - 1)
     _estimates(figure, right, view, first)
-    figure.suptitle(_title(view), fontsize=15, fontweight="bold")
+    figure.suptitle(_title(view), fontsize=15, fontweight="bold", parse_math=False)
     figure.legend(
         handles=_symbols(view),
         loc="outside lower center",
@@ -58,7 +59,7 @@ def _title(view: RayView) -> str:
     channel = f", {CHANNEL_NAMES[view.channel]} channel" if len(view.sigma_t) > 1 else ""
     x, y = view.pixel
     where = "" if view.medium == UNNAMED else f", in {view.medium}"
-    return f"{view.scene}, ray through pixel ({x}, {y}){where}{channel}"
+    return f"{printable(view.scene)}, ray through pixel ({x}, {y}){where}{channel}"
 
 
 def _colour(view: RayView, watched: Watched) -> str:
