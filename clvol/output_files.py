@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from clvol.errors import OptionError
+from clvol.files import other_kind
 
 StrPath = str | PathLike[str]
 _NO_SYNC = (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP)
@@ -39,10 +40,8 @@ def output_suffix(path: StrPath, suffixes: Sequence[str]) -> str:
 def check_file(path: StrPath) -> None:
     """Raise OptionError now for a path that `replacing` could not write after long work."""
     where, target = str(path), real(path)
-    if target.is_dir():
-        raise OptionError("is a folder, not a file", where, "give a file name")
-    if target.exists() and not target.is_file():
-        raise OptionError("is there and is no ordinary file", where, "give another name")
+    if kind := other_kind(target):
+        raise OptionError(f"is {kind}, not a file", where, "give another name")
     if target.exists() and not os.access(target, os.W_OK):
         raise OptionError("is write-protected", where, "give another name, or chmod it")
     check_room(target.parent, where)

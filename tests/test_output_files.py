@@ -203,8 +203,8 @@ def test_the_suffix_is_that_of_the_name_given(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("pipe.png", "no ordinary file"),
-        ("null.png", "no ordinary file"),
+        ("pipe.png", "is a named pipe"),
+        ("null.png", "is a device"),
         ("loop.png", "loop"),
         ("file/a.png", "Not a directory"),
         ("a\0.png", "null"),
