@@ -232,7 +232,7 @@ def _emission(medium: records.Medium) -> str:
         factors.append(f"a blackbody of ({_volume(medium.temperature)} - {offset}) times {scale} kelvin")
     if not factors:
         return ""
-    return f", emits {' times '.join(factors)} times {_number(medium.emission_scale)}"
+    return f", emits {' times '.join(factors)} times {_spectrum(medium.emission_scale)}"
 
 
 def _volume(volume: records.Volume) -> str:

@@ -136,7 +136,10 @@ class Features:
             ),
             chromatic_albedo=any(not _is_grey(m.albedo) for m in media),
             chromatic_light=not grey_light,
-            chromatic_emission=any(m.temperature is not None or not _is_grey(m.emission) for m in emissive),
+            chromatic_emission=any(
+                m.temperature is not None or not _is_grey(m.emission) or len(set(m.emission_scale)) > 1
+                for m in emissive
+            ),
             albedo_volumes=any(isinstance(m.albedo, records.GridVolume) for m in media),
             emission=bool(emissive),
             emission_volumes=any(isinstance(m.emission, records.GridVolume) for m in emissive),

@@ -131,7 +131,7 @@ def _emission(record: np.void, medium: records.Medium, volumes: dict[int, int]) 
     record["temperature_volume"] = volumes.get(id(medium.temperature), -1)
     if not medium.emits:
         return
-    radiance = np.full(3, medium.emission_scale)
+    radiance = _rgb(medium.emission_scale)
     if isinstance(medium.emission, records.ConstVolume):
         radiance = radiance * _rgb(medium.emission.value)
     if isinstance(medium.temperature, records.ConstVolume):

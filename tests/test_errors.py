@@ -104,3 +104,75 @@ def test_legal_extremes_are_rendered():
     """The neighbours of what is refused above."""
     for options in ({"spp": 1}, {"samples": (2**32 - 2, 1)}, {"seed": 2**64 - 1, "spp": 1}):
         assert np.isfinite(clvol.render(scene(), **options).image).all()
+
+
+class Mute:
+    """An object whose repr raises, as some libraries' do once they are closed."""
+
+    def __repr__(self):
+        raise RuntimeError("closed")
+
+    __str__ = __repr__
+
+
+NUMBERS = ("seed", "spp", "time_limit", "majorant_scale", "step", "target_error", "samples")
+NAMES = ("technique", "transmittance", "majorant", "lookup", "sampler", "aov")
+
+
+@pytest.mark.parametrize("value", ["one", Mute(), "x" * 10_000, [Mute()]], ids=lambda v: type(v).__name__)
+def test_values_of_other_types_are_errors_in_one_short_line(value):
+    """Every option of `render`, and every kind of parameter of a scene."""
+    camera = {"type": "perspective", "fov": 40}
+    calls = [lambda option=option: clvol.render(scene(), **{option: value}) for option in (*NUMBERS, *NAMES)]
+    calls += [
+        lambda key=key: clvol.load_dict({"type": "scene", "camera": camera | {key: value}})
+        for key in ("fov", "near_clip", "to_world", "film", "fov_axis", "id")
+        if key != "id" or not isinstance(value, str)
+    ]
+    calls += [lambda: clvol.rotate(value, 30), lambda: clvol.rotate([0, 0, 1], [value])]
+    for call in calls:
+        with pytest.raises(Error) as caught:
+            call()
+        assert len(str(caught.value)) < 1500
+
+
+@pytest.mark.parametrize("seed", [1.5, "1", -1, 2**64, None])
+def test_only_whole_numbers_are_seeds(seed):
+    if seed is not None:
+        with pytest.raises(OptionError, match="is not a 64-bit number"):
+            clvol.render(scene(), seed=seed)
+        with pytest.raises(OptionError, match="is not a 64-bit number"):
+            clvol.trace_ray(scene(), 1, 1, seed=seed)
+        with pytest.raises(OptionError, match="is not a 64-bit number"):
+            clvol.compare(scene(), techniques=["delta", "regular"], seed=seed)
+    with pytest.raises(OptionError, match="is not a 64-bit number"):
+        clvol.selftest(scene(), seed=seed)
+
+
+def test_every_error_is_exported():
+    for name in ("SceneError", "VolumeError", "OptionError", "DeviceError"):
+        assert issubclass(getattr(clvol, name), Error)
+        assert name in clvol.__all__
+
+
+def test_pythons_list_of_techniques_has_the_pilot():
+    with pytest.raises(OptionError, match="choose one of auto, auto:pilot, delta"):
+        clvol.render(scene(), technique="woodcock tracking")
+
+
+@pytest.mark.parametrize("pattern", ["²", "٢٢", "x" * 10_000])
+def test_odd_device_names_are_errors(pattern):
+    with pytest.raises(DeviceError, match="no OpenCL device matches") as caught:
+        clvol.render(scene(), device=pattern)
+    assert len(str(caught.value)) < 2000
+
+
+def test_records_show_themselves_in_short():
+    grid = np.random.default_rng(1).random((20, 20, 20))
+    fog = {"type": "heterogeneous", "sigma_t": {"type": "gridvolume", "data": grid}}
+    sky = {"type": "envmap", "bitmap": np.ones((60, 90, 3))}
+    camera = {"type": "perspective", "fov": 40}
+    cube = {"type": "cube", "bsdf": {"type": "null"}, "interior": fog}
+    loaded = clvol.load_dict({"type": "scene", "camera": camera, "fog": cube, "sky": sky})
+    assert "20 x 20 x 20" in repr(loaded.shapes[0]) and len(repr(loaded.shapes[0])) < 2500
+    assert "90 x 60" in repr(loaded.emitters[0]) and len(repr(loaded.emitters[0])) < 200

@@ -5,13 +5,14 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+import clvol
 from clvol.describe import describe_scene
 from clvol.errors import Error, SceneError
 from clvol.features import Features, medium_volumes
 from clvol.scene import load_dict, load_file, scale
 from clvol.scene.digest import scene_digest
 from clvol.scene.phase import MAX_LOBES
-from clvol.scene.records import BlendPhase, ConstVolume, GridVolume, Medium, Phase
+from clvol.scene.records import BlendPhase, ConstVolume, Film, GridVolume, Medium, Phase
 
 DENSITY = np.random.default_rng(3).uniform(0, 2, (4, 3, 2))
 COLOURED = DENSITY[..., None] * np.array([0.5, 1.0, 0.25])
@@ -128,7 +129,7 @@ def test_a_reduced_grid_that_media_share_stays_shared():
 def test_media_do_not_emit_unless_told_to():
     medium = medium_of()
     assert (medium.emission, medium.temperature) == (None, None)
-    assert (medium.emission_scale, medium.temperature_scale, medium.temperature_offset) == (1.0, 1.0, 0.0)
+    assert (medium.emission_scale, medium.temperature_scale, medium.temperature_offset) == ((1.0,), 1.0, 0.0)
     assert not medium.emits
     found = features_of()
     assert not (found.emission or found.emission_volumes or found.temperature or found.chromatic_emission)
@@ -137,11 +138,27 @@ def test_media_do_not_emit_unless_told_to():
 @pytest.mark.parametrize("kind", ["homogeneous", "heterogeneous"])
 def test_emission_is_a_number_a_colour_or_a_volume(kind):
     assert medium_of(type=kind, emission=2, emission_scale=3).emission.value == (2.0,)
-    assert medium_of(type=kind, emission=2, emission_scale=3).emission_scale == 3.0
+    assert medium_of(type=kind, emission=2, emission_scale=3).emission_scale == (3.0,)
     assert medium_of(type=kind, emission=RGB).emission.value == (1.0, 2.0, 4.0)
     assert medium_of(type=kind, emission={"type": "constvolume", "value": 5.0}).emission.value == (5.0,)
     glow = medium_of(type=kind, emission=grid(COLOURED)).emission
     assert glow.grid.values.shape == (4, 3, 2, 3)
+
+
+@pytest.mark.parametrize("emission", [2.0, grid()], ids=["number", "grid"])
+def test_emission_scale_may_be_a_colour(emission):
+    assert medium_of(emission=emission, emission_scale=RGB).emission_scale == (1.0, 2.0, 4.0)
+    assert features_of(emission=emission, emission_scale=RGB).chromatic_emission
+    assert not features_of(emission=emission, emission_scale=3.0).chromatic_emission
+    scale_of_one = {"type": "spectrum", "value": 1.0}  # a factor, and so 1 in each channel
+    assert medium_of(emission=emission, emission_scale=scale_of_one).emission_scale == (1.0,)
+
+
+def test_the_colour_of_emission_scale_is_seen():
+    scene = scene_of(emission=grid(), emission_scale=RGB, albedo=0.0)
+    image = clvol.render(replace(scene, film=Film(4, 4)), spp=16, seed=1).image.mean(axis=(0, 1))
+    assert image[0] > 0
+    np.testing.assert_allclose(image / image[0], [1.0, 2.0, 4.0], rtol=1e-5)
 
 
 def test_a_spectrum_of_emission_is_seen_as_that_of_a_light():
@@ -163,7 +180,7 @@ def test_a_volume_of_emission_can_shape_the_glow_of_a_temperature():
     medium = medium_of(emission=grid(), temperature=1500.0, emission_scale=4.0)
     assert isinstance(medium.emission, GridVolume)
     assert medium.temperature.value == (1500.0,)
-    assert medium.emission_scale == 4.0
+    assert medium.emission_scale == (4.0,)
 
 
 @pytest.mark.parametrize(

@@ -74,7 +74,7 @@ def plastic(reader: Reader) -> Plastic:
 
 def roughplastic(reader: Reader) -> RoughPlastic:
     """The `roughplastic` plugin: a diffuse base under a rough coat."""
-    reader.ignore("sample_visible")
+    reader.ignore(sample_visible=bool)
     base = texture(reader, "diffuse_reflectance", 0.5)
     indices = _indices(reader, "polypropylene", differ=True)
     nonlinear = reader.boolean("nonlinear", False)
@@ -172,7 +172,7 @@ def _metal(reader: Reader) -> tuple[Spectrum, Spectrum]:
 
 def _microfacets(reader: Reader) -> tuple[str, float, float]:
     """Distribution, alpha_u and alpha_v."""
-    reader.ignore("sample_visible")
+    reader.ignore(sample_visible=bool)
     distribution = reader.string("distribution", "beckmann", DISTRIBUTIONS)
     sides = [name for name in ("alpha_u", "alpha_v") if reader.has(name)]
     if sides and (len(sides) == 1 or reader.has("alpha")):

@@ -35,10 +35,13 @@ class Builder:
         self.plugins = plugins
         self.grids: dict[tuple[Path, str | None], Grid] = {}
         self.reduced: dict[int, Any] = {}  # by id() of a grid or volume that `grids` or a record keeps alive
+        self.taken: set[int] = set()  # id() of every plugin that another one holds or refers to
         self._ids: dict[str, Node] = {}
         self._built: dict[int, Any] = {}
         self._open: list[Node] = []
         self._collect_ids(root)
+        for alias, (target, where) in root.aliases.items():
+            self._add_alias(alias, target, where)
 
     def _collect_ids(self, node: Node) -> None:
         for _, value in node.parameters():
@@ -51,6 +54,16 @@ class Builder:
                 self._ids[value.id] = value
             self._collect_ids(value)
 
+    def _add_alias(self, alias: str, target: str, where: str) -> None:
+        if alias in self._ids:
+            raise SceneError(f"the id '{alias}' is given twice", where, f"first at {self._ids[alias].where}")
+        if target not in self._ids:
+            raise SceneError(f"alias of an unknown id '{target}'", where, self._known_ids(target))
+        self._ids[alias] = self._ids[target]
+
+    def _known_ids(self, wanted: str) -> str:
+        return join_hints(did_you_mean(wanted, self._ids), f"ids here: {listed(self._ids)}")
+
     def resolve(self, node: Node) -> Node:
         """The node that a `ref` stands for; any other node itself."""
         if node.type != "ref":
@@ -62,11 +75,7 @@ class Builder:
         if not isinstance(target, str):
             raise SceneError("a ref without an id", node.where)
         if target not in self._ids:
-            raise SceneError(
-                f"ref to an unknown id '{target}'",
-                node.where,
-                join_hints(did_you_mean(target, self._ids), f"ids here: {listed(self._ids)}"),
-            )
+            raise SceneError(f"ref to an unknown id '{target}'", node.where, self._known_ids(target))
         return self._ids[target]
 
     def kind_of(self, node: Node) -> str:

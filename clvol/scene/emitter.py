@@ -8,7 +8,7 @@ import numpy as np
 
 from clvol.scene.files import find_parameter
 from clvol.scene.image import image_from_array, read_image
-from clvol.scene.reader import Reader
+from clvol.scene.reader import BRIGHTEST, Reader
 from clvol.scene.records import (
     ConstantEmitter,
     DirectionalEmitter,
@@ -18,6 +18,9 @@ from clvol.scene.records import (
     SpotEmitter,
 )
 from clvol.scene.transforms import keeps_angles
+
+MOST_INTENSE = 1e30
+"""Largest intensity of a light that is a point, which may be far away: the Sun's is 3e25 W/sr."""
 
 NEGLIGIBLE = 1e-5
 """Share of the brightest value down to which negative values are rounding (colours out of the gamut)."""
@@ -34,7 +37,7 @@ def constant(reader: Reader) -> ConstantEmitter:
     """The `constant` plugin: the same radiance from everywhere."""
     _accept_common(reader)
     reader.transform()  # turns nothing, and is allowed on every emitter
-    return ConstantEmitter(reader.color("radiance", 1.0, light=True))
+    return ConstantEmitter(reader.color("radiance", 1.0, light=True, maximum=BRIGHTEST))
 
 
 def envmap(reader: Reader) -> EnvmapEmitter:
@@ -43,7 +46,7 @@ def envmap(reader: Reader) -> EnvmapEmitter:
     Slightly negative values, which converted photographs have, become 0 (see `NEGLIGIBLE`).
     """
     _accept_common(reader)
-    reader.ignore("mis_compensation")
+    reader.ignore(mis_compensation=bool)
     if reader.has("filename") == reader.has("bitmap"):
         reader.fail("an envmap needs either a filename or a bitmap (array)")
     if reader.has("filename"):
@@ -58,10 +61,14 @@ def envmap(reader: Reader) -> EnvmapEmitter:
             f"an envmap has at least 2 x 3 pixels, got {radiance.shape[1]} x {radiance.shape[0]}", place
         )
     radiance = radiance * np.float32(reader.number("scale", 1.0, minimum=0.0))
-    broken = ~np.isfinite(radiance) | (radiance < -NEGLIGIBLE * radiance.max())
+    broken = ~np.isfinite(radiance) | (radiance < -NEGLIGIBLE * radiance.max()) | (radiance > BRIGHTEST)
     if broken.any():
         row, column = np.argwhere(broken)[0][:2]
-        reader.fail(f"radiance must be finite and >= 0; it is not at row {row}, column {column}", place)
+        reader.fail(
+            f"radiance must be finite and >= 0; it is not at row {row}, column {column}",
+            place,
+            f"at most {BRIGHTEST:g}",
+        )
     to_world = reader.transform()
     if not keeps_angles(to_world):
         reader.fail("to_world of an envmap must not stretch or shear it", "to_world", "rotate it only")
@@ -71,7 +78,7 @@ def envmap(reader: Reader) -> EnvmapEmitter:
 def directional(reader: Reader) -> DirectionalEmitter:
     """The `directional` plugin: light travels along `direction`, or along `to_world`'s local +z."""
     _accept_common(reader)
-    irradiance = reader.color("irradiance", 1.0, light=True)
+    irradiance = reader.color("irradiance", 1.0, light=True, maximum=BRIGHTEST)
     if reader.has("direction") and reader.has("to_world"):
         reader.fail("give either direction or to_world, not both", "to_world")
     direction = reader.vector("direction", reader.transform()[:3, 2])
@@ -84,7 +91,7 @@ def directional(reader: Reader) -> DirectionalEmitter:
 def point(reader: Reader) -> PointEmitter:
     """The `point` plugin: at `position`, or at the origin of `to_world`."""
     _accept_common(reader)
-    intensity = reader.color("intensity", 1.0, light=True)
+    intensity = reader.color("intensity", 1.0, light=True, maximum=MOST_INTENSE)
     if reader.has("position") and reader.has("to_world"):
         reader.fail("give either position or to_world, not both", "to_world")
     position = reader.vector("position", reader.transform()[:3, 3])
@@ -95,7 +102,7 @@ def spot(reader: Reader) -> SpotEmitter:
     """The `spot` plugin: a cone of light along local +z, which fades from `beam_width` to `cutoff_angle`."""
     _accept_common(reader)
     reader.refuse("texture", "the spot is the same all round")
-    intensity = reader.color("intensity", 1.0, light=True)
+    intensity = reader.color("intensity", 1.0, light=True, maximum=MOST_INTENSE)
     cutoff = reader.number("cutoff_angle", 20.0, minimum=0.0, maximum=180.0)
     if cutoff == 0:
         reader.fail("a cutoff_angle of 0 leaves no light", "cutoff_angle")
@@ -117,11 +124,14 @@ def area(reader: Reader) -> AreaLight:
             "radiance",
             "give a number, an rgb or a spectrum",
         )
-    return AreaLight(reader.color("radiance", 1.0, light=True))
+    return AreaLight(reader.color("radiance", 1.0, light=True, maximum=BRIGHTEST))
 
 
 def _accept_common(reader: Reader) -> None:
-    """What every emitter may carry: a share of the samples, and the medium round it (found without)."""
-    reader.ignore("sampling_weight")
-    for _, medium in reader.children("medium"):
+    """What every emitter may carry: a share of the samples, and the medium that it is in, which is found from
+    the shapes (Mitsuba's path tracers do not look at it)."""
+    if reader.number("sampling_weight", 1.0, minimum=0.0) == 0:
+        reader.fail("sampling_weight is 0: Mitsuba never samples such a light", "sampling_weight")
+    medium = reader.only_child("medium")
+    if medium is not None:
         reader.build.build(medium)

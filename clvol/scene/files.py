@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -20,11 +21,8 @@ def find(name: str, folders: Sequence[Path], where: str) -> Path:
     """
     for folder in folders:
         path = folder / name
-        try:
-            if path.is_file():
-                return path
-        except (OSError, ValueError):  # a name too long for the system, or with a NUL in it
-            continue
+        if os.path.isfile(path):  # false, unlike Path.is_file, for a name too long for the system
+            return path
         if kind := other_kind(path):
             raise SceneError(f"'{path}' is {kind}, not a file", where)
     looked = ", ".join(str(folder.absolute()) for folder in folders)

@@ -49,7 +49,7 @@ def moment(reader: Reader) -> Chosen:
 
 
 def _limits(reader: Reader, choices: dict[str, str]) -> Integrator:
-    reader.ignore("samples_per_pass", "block_size")
+    reader.ignore(samples_per_pass=int, block_size=int)
     return Integrator(
         max_depth=reader.integer("max_depth", -1, -1),
         rr_depth=reader.integer("rr_depth", 5, 1),

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import logging
+import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from clvol.errors import SceneError
+from clvol.errors import SceneError, shown
 from clvol.scene import bsdf, emitter, integrator, medium, phase, sensor, shape, texture, volume
 from clvol.scene.builder import Builder, PluginTable
 from clvol.scene.mesh_files import FORMATS
 from clvol.scene.nodes import Node, from_dict
 from clvol.scene.records import ConstantEmitter, EnvmapEmitter, Integrator, Scene, Shape
+from clvol.scene.vocabulary import listed
 from clvol.scene.xml import read_xml
 
 PLUGINS: PluginTable = {
@@ -76,6 +79,11 @@ PLUGINS: PluginTable = {
 }
 """Kind -> plugin name -> the function that builds its record."""
 
+IN_SCENES = ("integrator", "sensor", "shape", "emitter")
+"""Kinds that a scene is made of; the others are parts of these."""
+
+log = logging.getLogger("clvol")
+
 
 def load_file(path: str | Path, **defaults: object) -> Scene:
     """Read a Mitsuba 3 XML scene.
@@ -94,6 +102,8 @@ def load_file(path: str | Path, **defaults: object) -> Scene:
     VolumeError
         A volume file that is broken or holds no valid coefficients.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise SceneError(f"load_file takes a file's name, not {shown(path)}", hint="load_dict takes dicts")
     return _build(read_xml(Path(path), defaults), source=str(path))
 
 
@@ -127,13 +137,15 @@ def _build(root: Node, source: str) -> Scene:
             seen.add(id(node))
             records[builder.kind_of(node)].append((node, builder.build(node)))
     camera = _exactly_one_sensor(records["sensor"], root)
-    _check_emitters(records["emitter"])
+    emitters = [pair for pair in records["emitter"] if not _is_inside(*pair, builder)]
+    _check_emitters(emitters)
+    _check_used(records, builder)
     return Scene(
         sensor=camera.camera,
         film=camera.film,
         integrator=_integrator(records["integrator"], _what_has_media(camera, records["shape"])),
         shapes=tuple(record for _, record in records["shape"]),
-        emitters=tuple(record for _, record in records["emitter"]),
+        emitters=tuple(record for _, record in emitters),
         spp=camera.sampler.spp,
         seed=camera.sampler.seed,
         source=source,
@@ -146,6 +158,27 @@ def _exactly_one_sensor(sensors: list[tuple[Node, sensor.Sensor]], root: Node) -
     if len(sensors) > 1:
         raise SceneError("a scene takes one sensor, this is the second", sensors[1][0].where)
     return sensors[0][1]
+
+
+def _is_inside(node: Node, record: object, builder: Builder) -> bool:
+    """Whether it is an area light that stands in the scene so that shapes can refer to it, and one does."""
+    return isinstance(record, emitter.AreaLight) and id(node) in builder.taken
+
+
+def _check_used(records: Mapping[str, list[tuple[Node, object]]], builder: Builder) -> None:
+    """What stands in the scene to be referred to must have an id, and should have a ref to it."""
+    pairs = [pair for kind in records if kind not in IN_SCENES for pair in records[kind]]
+    idle = [node for node, _ in pairs if id(node) not in builder.taken]
+    for node in idle:
+        if not node.id:
+            raise SceneError(
+                f"the {builder.kind_of(node)} '{node.type}' stands in the scene and belongs to nothing",
+                node.where,
+                "put it into the plugin that it is for, or give it an id and refer to it",
+            )
+    if idle:
+        some = listed([f"'{node.id}'" for node in idle], 5)
+        log.warning("defined in the scene and not used: %s", some)
 
 
 def _check_emitters(emitters: list[tuple[Node, object]]) -> None:

@@ -40,6 +40,9 @@ class Bitmap:
     wrap_mode: str = "repeat"
     source: str = ""
 
+    def __repr__(self) -> str:
+        return f"<Bitmap {self.source}: {self.pixels.shape[1]} x {self.pixels.shape[0]}>"
+
 
 @dataclass(frozen=True, eq=False)
 class Checkerboard:

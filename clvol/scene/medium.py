@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from clvol.scene.reader import ROUNDING, Reader
+from clvol.scene.reader import BRIGHTEST, ROUNDING, Reader
 from clvol.scene.records import ConstVolume, GridVolume, Medium, Phase, Spectrum, Volume
 from clvol.scene.volume import channels_of, largest_value, limited
 from clvol.volumes import check_coefficients, check_finite
@@ -27,10 +27,17 @@ def heterogeneous(reader: Reader) -> Medium:
 
 
 def _medium(reader: Reader, homogeneous: bool) -> Medium:
+    for name in ("sigma_s", "sigma_a"):
+        if name in reader.node:
+            reader.fail(
+                f"a medium has no '{name}'",
+                name,
+                "give sigma_t, which is sigma_a + sigma_s, and albedo, which is sigma_s / sigma_t",
+            )
     sigma_t, scale = _extinction(reader, homogeneous)
     albedo = _coefficient(reader, "albedo", 0.75, maximum=1.0)
     sample_emitters = reader.boolean("sample_emitters", True)
-    reader.ignore("has_spectral_extinction")
+    reader.ignore(has_spectral_extinction=bool)
     phase = reader.only_child("phase")
     return Medium(
         sigma_t,
@@ -115,7 +122,14 @@ def _emission(reader: Reader) -> dict[str, object]:
         fields["temperature_scale"] = reader.number("temperature_scale", 1.0)
         fields["temperature_offset"] = reader.number("temperature_offset", 0.0)
     if fields:
-        fields["emission_scale"] = reader.number("emission_scale", 1.0, minimum=0.0)
+        fields["emission_scale"] = reader.color("emission_scale", 1.0)
+        emission = fields.get("emission", ConstVolume((1.0,)))  # a blackbody's luminance is 1
+        brightest = largest_value(emission) * max(fields["emission_scale"])
+        if brightest > BRIGHTEST:
+            name = "emission_scale" if reader.has("emission_scale") else "emission"
+            reader.fail(
+                f"medium '{reader.type}' emits {brightest:g}, and may emit at most {BRIGHTEST:g}", name
+            )
     needs = {"emission_scale": "an emission or a temperature"}
     needs |= dict.fromkeys(("temperature_scale", "temperature_offset"), "a temperature")
     for name, what in needs.items():

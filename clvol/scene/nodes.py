@@ -9,10 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from clvol.errors import SceneError
+from clvol.errors import SceneError, shown
 
 MAX_DEPTH = 64
 """Deepest nesting accepted: far beyond any scene, well within Python's recursion limit."""
+
+NAMELESS = "nameless "
+"""How the made-up names of plugins begin that have none."""
 
 VALUE_TYPES = ("rgb", "spectrum")
 """Nodes that stand for a value, not for a plugin."""
@@ -31,6 +34,8 @@ class Node(dict):
         Name that a `ref` may use; "" without.
     folders : list of Path
         Where relative file names are looked for, first match first.
+
+    A scene's `aliases` are further ids: name -> (the id it stands for, where).
     """
 
     def __init__(self, where: str, kind: str = "", id: str = "", folders: list[Path] | None = None) -> None:
@@ -38,6 +43,8 @@ class Node(dict):
         self.where, self.kind, self.id = where, kind, id
         self.folders = folders if folders is not None else [Path()]
         self.places: dict[str, str] = {}
+        self.aliases: dict[str, tuple[str, str]] = {}
+        self._nameless = 0
 
     @property
     def type(self) -> str:
@@ -70,6 +77,11 @@ class Node(dict):
         self[key] = value
         self.places[key] = where
 
+    def add_nameless(self, value: Node) -> None:
+        """Add a plugin that has no name, under one that no file gives."""
+        self.add(f"{NAMELESS}{self._nameless}", value, value.where)
+        self._nameless += 1
+
 
 def from_dict(source: Mapping, where: str = "scene", depth: int = 0) -> Node:
     """A scene dict as nodes; `where` is the path so far, as in ``scene.shape_1.interior``.
@@ -88,11 +100,11 @@ def from_dict(source: Mapping, where: str = "scene", depth: int = 0) -> Node:
     key_as_id = where.rpartition(".")[2] if depth == 1 else ""  # Mitsuba: at the top, keys are ids
     node_id = source.get("id", key_as_id) if source["type"] != "ref" else ""
     if not isinstance(node_id, str):
-        raise SceneError(f"expected a string as id, got {node_id!r}", f"{where}.id")
+        raise SceneError(f"expected a string as id, got {shown(node_id)}", f"{where}.id")
     node = Node(where, id=node_id)
     for key, value in source.items():
         if not isinstance(key, str):
-            raise SceneError(f"parameter names are strings, got {key!r}", where)
+            raise SceneError(f"parameter names are strings, got {shown(key)}", where)
         if key == "id" and source["type"] != "ref":
             continue
         path = f"{where}.{key}"

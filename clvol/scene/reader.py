@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clvol.errors import SceneError
+from clvol.errors import SceneError, shown
 from clvol.masks import as_array, masked_count
 from clvol.scene import spectra
-from clvol.scene.nodes import Node
+from clvol.scene.nodes import NAMELESS, Node
 from clvol.scene.records import Spectrum
 from clvol.scene.transforms import as_matrix
 from clvol.scene.vocabulary import did_you_mean, join_hints, listed
@@ -30,6 +30,16 @@ ROUNDING = 1e-6
 """Share by which colours and volumes may exceed their maximum: rounding of what wrote them, which is cut."""
 
 
+BRIGHTEST = 1e15
+"""Largest radiance: the variance of a picture has its square, times weights, and must be a float."""
+
+BY_NAME = ("volume", "texture")
+"""Kinds of plugin that stand for the value of a parameter, and are found by its name."""
+
+_PLAIN = {bool: (bool, np.bool_), int: Integral, float: Real, str: str}
+_PLAIN_NAMES = {bool: "true or false", int: "an integer", float: "a number", str: "a string"}
+
+
 class Reader:
     """The parameters of `node`, converted and checked as a builder asks for them.
 
@@ -41,7 +51,6 @@ class Reader:
         self.type = node.type
         self.kind = build.kind_of(node)
         self._asked: list[str] = []
-        self._silent: set[str] = set()
         self._used: set[str] = set()
 
     # -- asking ------------------------------------------------------------------------------------
@@ -57,13 +66,17 @@ class Reader:
         where = self.node.place(name) if name else self.node.where
         raise SceneError(what, where, hint)
 
+    def raw(self, name: str) -> object:
+        """The value of `name` as it is given, or None."""
+        return self._take(name) if self.has(name) else None
+
     def _take(self, name: str) -> object:
         self._used.add(name)
         return self.node[name]
 
     def _wrong(self, name: str, expected: str, value: object) -> NoReturn:
-        shown = f"a '{value.type}'" if isinstance(value, Node) else repr(value)[:60]
-        self.fail(f"'{name}' of {self.kind} '{self.type}' must be {expected}, got {shown}", name)
+        given = f"a '{value.type}'" if isinstance(value, Node) else shown(value)
+        self.fail(f"'{name}' of {self.kind} '{self.type}' must be {expected}, got {given}", name)
 
     # -- plain values ------------------------------------------------------------------------------
 
@@ -220,7 +233,8 @@ class Reader:
         if not np.isfinite(pairs).all() or (np.diff(pairs[:, 0]) <= 0).any() or (pairs[:, 1] < 0).any():
             self._wrong(name, "pairs of increasing wavelengths (nm) and values >= 0", value)
         # Out of the gamut of what can be, Mitsuba cuts; a spectrum in [0, 1] may well be.
-        return np.minimum(spectra.sampled_to_rgb(pairs[:, 0], pairs[:, 1], light), maximum)
+        rgb = spectra.sampled_to_rgb(pairs[:, 0], pairs[:, 1], light)
+        return rgb if light else np.minimum(rgb, maximum)
 
     # -- plugins inside ----------------------------------------------------------------------------
 
@@ -235,6 +249,7 @@ class Reader:
                 target = self.build.resolve(value)
                 if self.build.kind_of(target) == kind:
                     self._used.add(key)
+                    self.build.taken.add(id(target))
                     found.append((key, target))
         return found
 
@@ -247,9 +262,13 @@ class Reader:
 
     # -- the rest ----------------------------------------------------------------------------------
 
-    def ignore(self, *names: str) -> None:
-        """Accept parameters that have no effect on the expected image."""
-        self._silent.update(names)
+    def ignore(self, **names: type) -> None:
+        """Accept parameters of these types (bool, int, float, str): they do not change the expected image."""
+        for name, kind in names.items():
+            if self.has(name):
+                value = self._take(name)
+                if not isinstance(value, _PLAIN[kind]) or (kind is not bool and isinstance(value, bool)):
+                    self._wrong(name, _PLAIN_NAMES[kind], value)
 
     def refuse(self, name: str, hint: str = "") -> None:
         """Raise if the scene gives `name`, a known parameter that is not supported yet."""
@@ -267,10 +286,14 @@ class Reader:
     def finish(self) -> None:
         """Raise for the first parameter or inner plugin that nobody asked for."""
         for name, value in self.node.parameters():
-            if name in self._used or name in self._silent or name in self._asked:
+            if name in self._used:
                 continue
+            if name in self._asked:
+                self.fail(f"'{name}' of {self.kind} '{self.type}' has no effect here", name, "leave it out")
             if isinstance(value, Node) and not value.is_value:
-                self.refuse_plugin(name)
+                inner = self.build.resolve(value)
+                if self.build.kind_of(inner) not in BY_NAME or name.startswith(NAMELESS):
+                    self.refuse_plugin(name)
             hint = join_hints(did_you_mean(name, self._asked), f"supported: {listed(self._asked)}")
             self.fail(f"unknown parameter '{name}' of {self.kind} '{self.type}'", name, hint)
 

@@ -134,7 +134,7 @@ class Medium:
     """Participating medium: sigma_t(x) = scale · sigma_t volume, sigma_s = albedo · sigma_t.
 
     A `homogeneous` medium fills its shape; a heterogeneous one is clipped to the box of its
-    sigma_t volume as well.  `scale` may be given as one number.
+    sigma_t volume as well.  `scale` and `emission_scale` may be given as one number.
 
     It emits sigma_a · L_e per length, where L_e = emission_scale · emission · blackbody(kelvin), without the
     factor that is None (both: no emission at all), and kelvin = (temperature − temperature_offset) ·
@@ -150,18 +150,19 @@ class Medium:
     sample_emitters: bool = True
     emission: Volume | None = None
     temperature: Volume | None = None  # one channel
-    emission_scale: float = 1.0
+    emission_scale: Spectrum = (1.0,)
     temperature_scale: float = 1.0
     temperature_offset: float = 0.0
     name: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "scale", as_spectrum(self.scale))
+        for name in ("scale", "emission_scale"):
+            object.__setattr__(self, name, as_spectrum(getattr(self, name)))
 
     @property
     def emits(self) -> bool:
         """Whether its L_e is anything but 0 everywhere, as far as can be told without reading grids."""
-        if not self.emission_scale or (self.emission is None and self.temperature is None):
+        if not any(self.emission_scale) or (self.emission is None and self.temperature is None):
             return False
         if isinstance(self.emission, ConstVolume) and not any(self.emission.value):
             return False
@@ -186,6 +187,9 @@ class Mesh:
     normals: np.ndarray | None = None
     uvs: np.ndarray | None = None
     source: str = ""
+
+    def __repr__(self) -> str:
+        return f"<Mesh {self.source}: {len(self.vertices)} vertices, {len(self.faces)} triangles>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,6 +229,9 @@ class EnvmapEmitter:
     radiance: np.ndarray
     to_world: np.ndarray
     source: str = ""
+
+    def __repr__(self) -> str:
+        return f"<EnvmapEmitter {self.source}: {self.radiance.shape[1]} x {self.radiance.shape[0]}>"
 
 
 @dataclass(frozen=True)

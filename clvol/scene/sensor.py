@@ -35,7 +35,7 @@ class Sensor:
 def perspective(reader: Reader) -> Sensor:
     """The `perspective` plugin; a focal length is for 35 mm film, along the diagonal."""
     camera = _pinhole(reader)
-    reader.ignore("focus_distance")  # everything is sharp
+    reader.ignore(focus_distance=float)  # everything is sharp
     offset = tuple(reader.number(f"principal_point_offset_{axis}", 0.0) for axis in "xy")
     return _sensor(reader, replace(camera, principal_point_offset=offset))
 
@@ -118,7 +118,7 @@ def hdrfilm(reader: Reader) -> Film:
             "supported: rgb",
         )
     reader.string("component_format", "float16", ("float16", "float32", "uint32"))
-    reader.ignore("file_format", "banner", "compensate")
+    reader.ignore(file_format=str, banner=bool, compensate=bool)
     rfilter = reader.only_child("rfilter")
     return Film(
         width,

@@ -19,13 +19,13 @@ log = logging.getLogger("clvol")
 
 def cube(reader: Reader) -> Shape:
     """The `cube` plugin, -1..1 along each axis under `to_world`."""
-    reader.ignore("face_normals")
+    reader.ignore(face_normals=bool)
     return _shape(reader, "cube", reader.transform())
 
 
 def rectangle(reader: Reader) -> Shape:
     """The `rectangle` plugin, -1..1 along x and y under `to_world`, facing +z."""
-    reader.ignore("face_normals")
+    reader.ignore(face_normals=bool)
     return _shape(reader, "rectangle", reader.transform())
 
 

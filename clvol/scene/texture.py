@@ -16,7 +16,7 @@ NEGLIGIBLE = 1e-4
 
 def bitmap(reader: Reader) -> Bitmap:
     """The `bitmap` plugin: a picture from a file or an array, of values in [0, 1] after decoding."""
-    reader.ignore("accel", "format")
+    reader.ignore(accel=bool, format=str)
     if reader.has("filename") == reader.has("bitmap"):
         reader.fail("a bitmap texture needs either a filename or a bitmap (array)")
     raw = reader.boolean("raw", False)
@@ -75,10 +75,9 @@ def constant(reader: Reader, name: str, default: float, minimum: float) -> float
 
 def _to_uv(reader: Reader) -> np.ndarray:
     """The 3x3 part of `to_uv` (3x3, or 4x4 without its z) that moves (u, v)."""
-    given = reader.node.get("to_uv")
+    given = reader.raw("to_uv")
     given = getattr(given, "matrix", given)
     if np.shape(given) == (3, 3):
-        reader.has("to_uv")
         matrix = np.asarray(given)
         if matrix.dtype.kind not in "iuf" or not np.isfinite(matrix).all() or (matrix[2] != (0, 0, 1)).any():
             reader.fail("to_uv must be finite, with a last row of 0 0 1", "to_uv")

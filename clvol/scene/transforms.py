@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clvol.errors import SceneError
+from clvol.errors import SceneError, shown
 from clvol.masks import as_array
 
 
@@ -108,7 +108,7 @@ def _vector(value: ArrayLike, what: str) -> np.ndarray:
     if vector.shape == ():
         vector = np.full(3, vector)
     if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise SceneError(f"{what}: expected three finite numbers, got {value!r}")
+        raise SceneError(f"{what}: expected three finite numbers, got {shown(value)}")
     return vector
 
 
@@ -118,7 +118,7 @@ def _number(value: float, what: str) -> float:
     except (TypeError, ValueError, OverflowError):
         number = np.nan
     if not np.isfinite(number):
-        raise SceneError(f"{what}: expected a finite number, got {value!r}")
+        raise SceneError(f"{what}: expected a finite number, got {shown(value)}")
     return number
 
 

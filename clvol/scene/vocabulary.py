@@ -5,8 +5,11 @@ What is supported is not listed here: the plugin tables and the parameters that 
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Iterable
 from difflib import get_close_matches
+
+from clvol.errors import shortened
 
 LATER: dict[str, tuple[str, ...]] = {
     "integrator": ("direct", "aov", "depth", "ptracer"),
@@ -25,15 +28,37 @@ LATER: dict[str, tuple[str, ...]] = {
 """Kind -> plugins known by name and not supported in this version."""
 
 
+LONGEST_NAME = 64
+"""Characters of a name beyond which it is not compared, and shown in part."""
+MOST_COMPARED, MOST_LISTED = 500, 64
+
+
 def did_you_mean(name: str, candidates: Iterable[str]) -> str:
-    """ "did you mean 'x'?" when a candidate is close to `name`, else an empty string."""
-    close = get_close_matches(name, list(candidates), n=1, cutoff=0.6)
+    """ "did you mean 'x'?" when a candidate is close to `name`, else an empty string.
+
+    Of very many candidates those that begin most like `name` are compared.
+    """
+    if len(name) > LONGEST_NAME:
+        return ""
+    short = [candidate for candidate in candidates if len(candidate) <= LONGEST_NAME]
+    if len(short) > MOST_COMPARED:
+        short = heapq.nlargest(MOST_COMPARED, short, key=lambda candidate: _shared_start(name, candidate))
+    close = get_close_matches(name, short, n=1, cutoff=0.6)
     return f"did you mean '{close[0]}'?" if close else ""
 
 
-def listed(names: Iterable[str]) -> str:
-    """Names for a message, in order, or "none"."""
-    return ", ".join(names) or "none"
+def _shared_start(one: str, other: str) -> int:
+    return next(
+        (n for n, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other))
+    )
+
+
+def listed(names: Iterable[str], most: int = MOST_LISTED) -> str:
+    """Names for a message, in order, or "none"; of very many the first ones, and how many more."""
+    every = list(names)
+    more = len(every) - most
+    shown = [shortened(name, LONGEST_NAME) for name in every[:most]]
+    return (", ".join(shown) or "none") + (f" and {more:,} more" if more > 0 else "")
 
 
 def join_hints(*hints: str) -> str:

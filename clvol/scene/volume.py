@@ -48,11 +48,13 @@ def gridvolume(reader: Reader) -> Volume:
     Samples sit at the centres of equal cells of the unit cube (or of the file's own box) under
     `to_world`; those of a .vdb file sit where a `vdbvolume` has them.
     """
-    reader.ignore("accel", "raw")
+    reader.ignore(accel=bool, raw=bool)
     wrap_mode = reader.string("wrap_mode", "clamp", WRAP_MODES)
     use_box = reader.boolean("use_grid_bbox", False)
     grid = _grid(reader)
     if isinstance(grid, SparseGrid):
+        if reader.has("use_grid_bbox") and not use_box:
+            reader.fail("a sparse grid always lies where its file says", "use_grid_bbox", "use to_world")
         if wrap_mode != "clamp":
             reader.fail(
                 "a sparse grid has no wrap_mode: outside its box is the background",
@@ -88,6 +90,8 @@ def _grid(reader: Reader) -> Grid:
             hint=" and ".join(sources),
         )
     if sources != ["filename"]:
+        if name is not None:
+            reader.fail(f"an array has no grid named '{name}'", "grid", "the name goes with a filename")
         return dense_from_array(reader.array(sources[0]), source=reader.node.place(sources[0]))
     path = find_parameter(reader, "filename")
     grids = reader.build.grids

@@ -5,17 +5,19 @@ What plugins and parameters mean is not known here; how XML writes numbers, colo
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
+from numbers import Real
 from pathlib import Path
 
 import numpy as np
 
-from clvol.errors import SceneError
+from clvol.errors import SceneError, shortened, shown
 from clvol.files import other_kind
 from clvol.scene import transforms
 from clvol.scene.files import find
-from clvol.scene.nodes import Node
+from clvol.scene.nodes import NAMELESS, Node
 from clvol.scene.vocabulary import did_you_mean, join_hints, listed
 from clvol.scene.xml_tree import Element, parse_elements
 from clvol.scene.xml_values import (
@@ -34,14 +36,16 @@ PLUGIN_TAGS = (
     *("sensor", "film", "rfilter", "sampler", "integrator", "texture"),
 )
 VALUE_TAGS = ("float", "integer", "boolean", "string", "rgb", "spectrum", "point", "vector")
-OTHER_TAGS = ("transform", "default", "include", "path", "ref")
+OTHER_TAGS = ("transform", "default", "include", "path", "ref", "alias")
 TRANSFORM_TAGS = ("translate", "scale", "rotate", "lookat", "matrix")
 
-MAX_TEXT = 2**20
-"""Longest attribute after its $names are replaced: defaults made of defaults can grow without end."""
+MAX_TEXT, MAX_TEXTS = 2**20, 2**24
+"""Longest attribute, and most characters of all together, that come from $names: defaults made of defaults
+can grow without end."""
+MAX_NAME = 256
+"""Longest name of a default."""
 MAX_FILES = 1000
 """Most files one scene may include, counted as often as they are."""
-_NAMELESS = "_arg_"
 _REFERENCE = re.compile(r"(?<!\\)\$(\w*)", re.ASCII)
 
 
@@ -53,9 +57,13 @@ def read_xml(path: Path, keywords: Mapping[str, object]) -> Node:
     SceneError
         With file and line.
     """
-    if not path.is_file():
+    if str(path).lstrip().startswith("<"):
+        raise SceneError(
+            f"a file's name is wanted, got XML: '{shortened(str(path), 40)}'", hint="write it to a .xml file"
+        )
+    if not os.path.isfile(path):  # false, unlike Path.is_file, for a name too long for the system
         if kind := other_kind(path):
-            hint = "name the .xml file in it" if path.is_dir() else ""
+            hint = "name the .xml file in it" if os.path.isdir(path) else ""
             raise SceneError(f"'{path}' is {kind}, not a scene file", hint=hint)
         raise SceneError(f"scene file '{path}' does not exist")
     if path.suffix.lower() in SUFFIXES:
@@ -66,6 +74,7 @@ def read_xml(path: Path, keywords: Mapping[str, object]) -> Node:
         raise SceneError(f"'{path}' is a volume that cannot be read, not a scene", hint=hint)
     reader = _XmlReader(keywords)
     root = reader.file(path, [], "")
+    root.aliases = reader.aliases
     if root.kind != "scene":
         raise SceneError(f"the root element must be <scene>, not <{root.kind}>", root.where)
     unused = sorted(set(keywords) - reader.used)
@@ -85,8 +94,9 @@ class _XmlReader:
     def __init__(self, keywords: Mapping[str, object]) -> None:
         self.values = {name: _as_text(value) for name, value in keywords.items()}
         self.used: set[str] = set()
+        self.aliases: dict[str, tuple[str, str]] = {}
         self.reading: list[Path] = []
-        self.files = 0
+        self.files = self.replaced = 0
 
     # -- files -------------------------------------------------------------------------------------
 
@@ -106,7 +116,7 @@ class _XmlReader:
         version = attributes.get("version", "")
         if not re.fullmatch(r"[23]\.\d+(\.\d+)?", version, re.ASCII):
             what = f"version '{version}' is not supported" if version else "the version is missing"
-            fail(element, what, f'write <{element.tag} version="3.0.0">')
+            fail(element, what, _version_hint(element.tag, version))
         node = self.plugin(element, [path.parent, *folders])
         self.reading.pop()
         return node
@@ -120,9 +130,8 @@ class _XmlReader:
             _add_child(parent, attributes.get("name", ""), node)
             return
         for key, value in node.parameters():
-            nameless = key.startswith(_NAMELESS)
-            if isinstance(value, Node) and nameless:
-                _add_child(parent, "", value)
+            if isinstance(value, Node) and key.startswith(NAMELESS):
+                parent.add_nameless(value)
             else:
                 parent.add(key, value, node.place(key))
 
@@ -149,14 +158,19 @@ class _XmlReader:
             nonlocal length
             # As in Mitsuba the longest known name wins: $width2 may be $width followed by a 2.
             word = match[1]
-            name = next((word[:end] for end in range(len(word), 0, -1) if word[:end] in self.values), None)
+            ends = range(min(len(word), MAX_NAME), 0, -1)
+            name = next((word[:end] for end in ends if word[:end] in self.values), None)
             if name is None:
+                word = shortened(word, 60)
                 hint = join_hints(did_you_mean(word, self.values), f"known: {listed(self.values)}")
                 fail(element, f"${word} has no value", hint)
             self.used.add(name)
             length += len(self.values[name])
+            self.replaced += len(self.values[name])
             if length > MAX_TEXT:
                 fail(element, f"the text is longer than {MAX_TEXT} characters once ${name} is replaced")
+            if self.replaced > MAX_TEXTS:
+                fail(element, f"the values of all $names together are longer than {MAX_TEXTS} characters")
             return self.values[name] + word[len(name) :]
 
         return _REFERENCE.sub(value, text).replace("\\$", "$")
@@ -177,8 +191,13 @@ class _XmlReader:
         """Add what one element inside a plugin says to the plugin's node."""
         tag = element.tag
         if tag in PLUGIN_TAGS[1:]:
+            if "version" in element.attributes:
+                fail(element, f"unknown attribute 'version' of <{tag}>", "a file's first element has it")
             node = self.plugin(element, parent.folders)
             _add_child(parent, self.substitute(element.attributes.get("name", ""), element), node)
+        elif tag == "alias":
+            _no_children(element)
+            self.alias(element)
         elif tag in VALUE_TAGS:
             _no_children(element)
             name, value = self.value(element)
@@ -203,22 +222,28 @@ class _XmlReader:
             tags = (*PLUGIN_TAGS[1:], *VALUE_TAGS, *OTHER_TAGS)
             fail(element, f"unknown element <{tag}>", join_hints(did_you_mean(tag, tags), _only_inside(tag)))
 
+    def alias(self, element: Element) -> None:
+        """<alias> gives what has one id a second one."""
+        attributes = self.attributes(element, "!id", "!as")
+        if attributes["as"] in self.aliases:
+            first = self.aliases[attributes["as"]][1]
+            fail(element, f"the id '{attributes['as']}' is given twice", f"first at {first}")
+        self.aliases[attributes["as"]] = attributes["id"], element.where
+
     def directive(self, element: Element, parent: Node) -> None:
         """<default> sets a $name that has no value yet; <path> adds a folder to look for files in."""
         if element.tag == "default":
             attributes = self.attributes(element, "!name", "!value")
-            if not re.fullmatch(r"\w+", attributes["name"], re.ASCII):
-                fail(
-                    element,
-                    f"'{attributes['name']}' cannot be the name of a default",
-                    "use letters, digits, _",
-                )
-            self.values.setdefault(attributes["name"], attributes["value"])
+            name = attributes["name"]
+            if len(name) > MAX_NAME or not re.fullmatch(r"\w+", name, re.ASCII):
+                what = f"'{shortened(name, 60)}' cannot be the name of a default"
+                fail(element, what, f"use letters, digits and _, at most {MAX_NAME}")
+            self.values.setdefault(name, attributes["value"])
             return
         folder = self.attributes(element, "!value")["value"]
         if parent.kind != "scene":
             fail(element, "<path> belongs directly into <scene>")
-        found = [base / folder for base in parent.folders if (base / folder).is_dir()]
+        found = [base / folder for base in parent.folders if os.path.isdir(base / folder)]
         if not found:
             fail(element, f"folder '{folder}' does not exist", "paths are relative to the scene file")
         parent.folders.insert(0, found[0])
@@ -293,16 +318,22 @@ class _XmlReader:
 
 
 def _add_child(parent: Node, name: str, node: Node) -> None:
-    """Add a plugin or ref under its name, or under its id or a made-up one when it has none."""
-    if not name:
-        number = sum(1 for key in parent if key.startswith(_NAMELESS))
-        name = f"{_NAMELESS}{number}"
-    parent.add(name, node, node.where)
+    """Add a plugin or ref under its name, or a made-up one when it has none."""
+    if name:
+        parent.add(name, node, node.where)
+    else:
+        parent.add_nameless(node)
 
 
 def _no_children(element: Element) -> None:
     if element.children:
         fail(element.children[0], f"<{element.children[0].tag}> cannot be inside <{element.tag}>")
+
+
+def _version_hint(tag: str, version: str) -> str:
+    if re.match(r"[01]\.", version):
+        return f'write its names as Mitsuba 3 has them (sigmaT is sigma_t), and <{tag} version="3.0.0">'
+    return f'for Mitsuba 2 and 3, write <{tag} version="3.0.0">'
 
 
 def _only_inside(tag: str) -> str:
@@ -315,4 +346,6 @@ def _as_text(value: object) -> str:
         return "true" if value else "false"
     if isinstance(value, list | tuple | np.ndarray):
         return ", ".join(_as_text(part) for part in value)
+    if not isinstance(value, str | Real | np.generic | os.PathLike):
+        raise SceneError(f"a default's value is a string, a number or a list of them, got {shown(value)}")
     return str(value)

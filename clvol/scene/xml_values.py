@@ -7,10 +7,11 @@ from typing import NoReturn
 
 import numpy as np
 
-from clvol.errors import SceneError
+from clvol.errors import SceneError, shortened
 from clvol.scene.xml_tree import Element
 
-_FLOAT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_FLOAT = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_LONGEST_NUMBER = 1000
 _INTEGER = re.compile(r"[+-]?\d{1,18}", re.ASCII)
 
 
@@ -22,14 +23,14 @@ def fail(element: Element, what: str, hint: str = "") -> NoReturn:
 def parse_integer(element: Element, text: str) -> int:
     """A whole number."""
     if not _INTEGER.fullmatch(text.strip()):
-        fail(element, f"'{text}' is not an integer")
+        fail(element, f"'{shortened(text, 60)}' is not an integer")
     return int(text)
 
 
 def parse_float(element: Element, text: str) -> float:
     """A number in decimal or scientific notation."""
-    if not _FLOAT.fullmatch(text.strip()):
-        fail(element, f"'{text}' is not a number")
+    if len(text) > _LONGEST_NUMBER or not _FLOAT.fullmatch(text.strip()):
+        fail(element, f"'{shortened(text, 60)}' is not a number")
     return float(text)
 
 
@@ -69,6 +70,6 @@ def parse_spectrum(element: Element, text: str) -> float | list[tuple[float, flo
     for part in re.split(r"[\s,]+", text.strip(" \t\r\n,")):
         wavelength, separator, value = part.partition(":")
         if not separator:
-            fail(element, f"'{part}' is not a wavelength:value pair")
+            fail(element, f"'{shortened(part, 60)}' is not a wavelength:value pair")
         pairs.append((parse_float(element, wavelength), parse_float(element, value)))
     return pairs

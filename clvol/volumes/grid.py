@@ -25,6 +25,10 @@ class DenseGrid:
     name: str = ""
     source: str = ""
 
+    def __repr__(self) -> str:
+        depth, height, width, channels = self.values.shape
+        return f"<DenseGrid {self.name or self.source}: {width} x {height} x {depth}, {channels} channels>"
+
 
 @dataclass(frozen=True, eq=False)
 class SparseGrid:
@@ -52,6 +56,9 @@ class SparseGrid:
     active_box: np.ndarray
     name: str = "density"
     source: str = ""
+
+    def __repr__(self) -> str:
+        return f"<SparseGrid {self.name}: {len(self.leaf_origins)} leaves, {len(self.tile_origins)} tiles>"
 
     @property
     def active_voxels(self) -> int:

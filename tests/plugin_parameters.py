@@ -1,0 +1,225 @@
+"""What each parameter of each plugin does: the table that `test_reader_sweep` holds the reader to.
+
+`PARAMETERS`: plugin -> (what it needs, parameter -> another value, which must show in the records).  `Silent`
+values are accepted and change no expected image.  The files named here are written by the test.
+"""
+
+import numpy as np
+
+from clvol.scene import rotate, translate
+
+RGB = {"type": "rgb", "value": [0.1, 0.2, 0.3]}
+TEXELS = np.linspace(0, 1, 12, dtype=np.float32).reshape(2, 2, 3)
+SKY = np.linspace(0, 1, 36, dtype=np.float32).reshape(3, 4, 3)
+CELLS = np.linspace(0, 1, 8).reshape(2, 2, 2)
+TEXTURE = {"type": "bitmap", "bitmap": TEXELS}
+VOLUME = {"type": "gridvolume", "data": CELLS}
+MOVED, TURNED = translate([1, 2, 3]), rotate([1, 2, 3], 40)
+
+
+class Silent:
+    """A value that is accepted and changes no expected image."""
+
+    def __init__(self, value):
+        self.value = value
+
+
+# -- the table: plugin -> (what it needs, parameter -> another value) --------------------------------
+
+CHOICES = {
+    "technique": "delta",
+    "transmittance": "ratio",
+    "majorant": "grid",
+    "lookup": "exact",
+    "absorption": "weight",
+    "probability": "max",
+    "control": "min",
+    "sampler": "sobol",
+}
+LIMITS = {
+    "max_depth": 5,
+    "rr_depth": 9,
+    "hide_emitters": True,
+    "samples_per_pass": Silent(4),
+    "block_size": Silent(16),
+}
+CAMERA = {
+    "to_world": MOVED,
+    "fov": 30.0,
+    "fov_axis": "y",
+    "near_clip": 0.5,
+    "far_clip": 50.0,
+    "film": {"type": "hdrfilm", "width": 5},
+    "sampler": {"type": "independent", "seed": 7},
+    "medium": {"type": "homogeneous"},
+}
+LIGHT = {"sampling_weight": Silent(2.0), "medium": Silent({"type": "homogeneous"})}
+SHAPE = {
+    "to_world": MOVED,
+    "flip_normals": True,
+    "bsdf": {"type": "null"},
+    "emitter": {"type": "area"},
+    "interior": {"type": "homogeneous"},
+    "exterior": {"type": "homogeneous"},
+}
+MESH = SHAPE | {"face_normals": True}
+DIELECTRIC = {
+    "int_ior": 1.7,
+    "ext_ior": "water",
+    "specular_reflectance": TEXTURE,
+    "specular_transmittance": RGB,
+}
+ROUGH = {"distribution": "ggx", "alpha": 0.3, "sample_visible": Silent(False)}
+METAL = {"material": "Au", "specular_reflectance": TEXTURE}
+COAT = {
+    "diffuse_reflectance": TEXTURE,
+    "int_ior": 1.7,
+    "ext_ior": "water",
+    "nonlinear": True,
+    "specular_reflectance": RGB,
+}
+MEDIUM = {
+    "sigma_t": RGB,
+    "albedo": VOLUME,
+    "scale": RGB,
+    "phase": {"type": "hg"},
+    "sample_emitters": False,
+    "has_spectral_extinction": Silent(True),
+    "emission": 2.0,
+    "emission_scale": RGB,
+    "temperature": VOLUME,
+    "temperature_scale": 2.0,
+    "temperature_offset": -1.0,
+}
+UV = np.diag([2.0, 3.0, 1.0])
+
+PARAMETERS = {
+    "volpath": ({}, LIMITS | CHOICES),
+    "volpathmis": ({}, LIMITS | CHOICES),
+    "path": ({}, LIMITS),
+    "moment": ({"inner": {"type": "path"}}, {"inner": {"type": "volpath", "max_depth": 2}}),
+    "perspective": (
+        {"fov": 40.0},
+        CAMERA
+        | {"principal_point_offset_x": 0.1, "principal_point_offset_y": 0.1, "focus_distance": Silent(2.0)},
+    ),
+    "thinlens": (
+        {"fov": 40.0, "aperture_radius": 0.1},
+        CAMERA | {"aperture_radius": 0.2, "focus_distance": 2.0},
+    ),
+    "hdrfilm": (
+        {"width": 8, "height": 9},
+        {
+            "width": 6,
+            "height": 7,
+            "crop_width": 4,
+            "crop_height": 4,
+            "sample_border": True,
+            "rfilter": {"type": "box"},
+            "pixel_format": Silent("rgb"),
+            "component_format": Silent("float32"),
+            "file_format": Silent("openexr"),
+            "banner": Silent(False),
+            "compensate": Silent(True),
+        },
+    ),
+    "box": ({}, {}),
+    "tent": ({}, {"radius": 2.0}),
+    "gaussian": ({}, {"stddev": 0.7}),
+    "mitchell": ({}, {"B": 0.2, "C": 0.2}),
+    "catmullrom": ({}, {}),
+    "lanczos": ({}, {"lobes": 2}),
+    "independent": ({}, {"sample_count": 9, "seed": 9}),
+    "cube": ({}, SHAPE | {"face_normals": Silent(True)}),
+    "sphere": ({}, SHAPE | {"center": [1, 2, 3], "radius": 2.0}),
+    "rectangle": ({}, SHAPE | {"face_normals": Silent(True)}),
+    "disk": ({}, SHAPE),
+    "cylinder": ({}, SHAPE | {"p0": [1, 2, 3], "p1": [1, 2, 3], "radius": 2.0}),
+    "obj": ({"filename": "a.obj"}, MESH | {"filename": "b.obj", "flip_tex_coords": False}),
+    "ply": (
+        {"filename": "a.ply"},
+        MESH | {"filename": "b.ply", "flip_tex_coords": Silent(True)},
+    ),  # without uvs
+    "stl": ({"filename": "a.stl"}, MESH | {"filename": "b.stl", "face_normals": Silent(True)}),
+    "glb": ({"filename": "a.glb"}, MESH | {"filename": "b.glb", "flip_tex_coords": Silent(False)}),
+    "gltf": ({"filename": "a.gltf"}, MESH | {"filename": "b.gltf", "flip_tex_coords": Silent(False)}),
+    "null": ({}, {}),
+    "diffuse": ({}, {"reflectance": TEXTURE}),
+    "dielectric": ({}, DIELECTRIC),
+    "thindielectric": ({}, DIELECTRIC),
+    "roughdielectric": ({}, DIELECTRIC | ROUGH),
+    "conductor": ({}, METAL),
+    "roughconductor": ({}, METAL | ROUGH),
+    "plastic": ({}, COAT),
+    "roughplastic": ({}, COAT | ROUGH),
+    "twosided": ({"inner": {"type": "diffuse"}}, {"inner": {"type": "plastic"}, "back": {"type": "plastic"}}),
+    "mask": ({"inner": {"type": "diffuse"}}, {"inner": {"type": "plastic"}, "opacity": TEXTURE}),
+    "homogeneous": ({"emission": 1.0, "temperature": 900.0}, MEDIUM),
+    "heterogeneous": ({"emission": 1.0, "temperature": 900.0}, MEDIUM | {"sigma_t": VOLUME}),
+    "gridvolume": (
+        {"filename": "a.vol"},
+        {
+            "filename": "b.vol",
+            "to_world": MOVED,
+            "use_grid_bbox": True,
+            "filter_type": "nearest",
+            "wrap_mode": "repeat",
+            "accel": Silent(False),
+            "raw": Silent(True),
+        },
+    ),
+    "constvolume": ({}, {"value": 0.5, "to_world": MOVED}),
+    "vdbvolume": (
+        {"filename": "fog.vdb"},
+        {"filename": "other.vdb", "grid": "heat", "to_world": MOVED, "filter_type": "nearest"},
+    ),
+    "isotropic": ({}, {}),
+    "hg": ({}, {"g": 0.3}),
+    "rayleigh": ({}, {}),
+    "blendphase": (
+        {"weight": 0.5, "a": {"type": "isotropic"}, "b": {"type": "rayleigh"}},
+        {"weight": 0.2, "a": {"type": "hg"}, "b": {"type": "hg"}},
+    ),
+    "constant": ({}, LIGHT | {"radiance": RGB, "to_world": Silent(TURNED)}),
+    "envmap": (
+        {"bitmap": SKY},
+        LIGHT | {"bitmap": 2 * SKY, "scale": 2.0, "to_world": TURNED, "mis_compensation": Silent(True)},
+    ),
+    "directional": ({}, LIGHT | {"irradiance": RGB, "direction": [1, 2, 3], "to_world": TURNED}),
+    "point": ({}, LIGHT | {"intensity": RGB, "position": [1, 2, 3], "to_world": MOVED}),
+    "spot": ({}, LIGHT | {"intensity": RGB, "cutoff_angle": 30.0, "beam_width": 5.0, "to_world": TURNED}),
+    "area": ({}, LIGHT | {"radiance": RGB}),
+    "bitmap": (
+        {"bitmap": TEXELS},
+        {
+            "bitmap": TEXELS / 2,
+            "to_uv": UV,
+            "filter_type": "nearest",
+            "wrap_mode": "clamp",
+            "raw": Silent(True),  # of an array of floats
+            "accel": Silent(False),
+            "format": Silent("fp16"),
+        },
+    ),
+    "checkerboard": ({}, {"color0": RGB, "color1": RGB, "to_uv": UV}),
+}
+INSTEAD = {
+    ("perspective", "focal_length"): ({}, "85mm"),
+    ("thinlens", "focal_length"): ({"aperture_radius": 0.1}, "85mm"),
+    ("hdrfilm", "crop_offset_x"): ({"crop_width": 4}, 1),
+    ("hdrfilm", "crop_offset_y"): ({"crop_height": 4}, 1),
+    ("conductor", "eta"): ({}, RGB),
+    ("conductor", "k"): ({}, RGB),
+    ("roughconductor", "eta"): ({}, RGB),
+    ("roughconductor", "k"): ({}, RGB),
+    **{
+        (bsdf, f"alpha_{axis}"): ({"alpha_u": 0.1, "alpha_v": 0.1}, 0.3)
+        for bsdf in ("roughdielectric", "roughconductor")
+        for axis in "uv"
+    },
+    ("gridvolume", "data"): ({}, CELLS),
+    ("gridvolume", "grid"): ({}, CELLS),
+    ("envmap", "filename"): ({}, "sky.exr"),
+    ("bitmap", "filename"): ({}, "sky.exr"),
+}
+"""(plugin, parameter) -> (what it goes with, its value), where it goes without what the plugin needs else."""
