@@ -25,6 +25,8 @@ CHUNK = 8
 """Independent samples are given out in multiples of so many."""
 LEAST = 16
 """No pixel gets fewer, but for a lower cap, nor the first pilot."""
+BLIND = 256
+"""Samples a pixel after which a pilot that saw no light gives up: light may be rare."""
 PILOT_SHARE = 8
 """The picture has at most so many times the pilot's samples, lest a pilot too short decide on too many."""
 PILOT_GROWTH = 4
@@ -204,10 +206,14 @@ class TargetRender:
         self.noise = np.sqrt(_smoothed(variance * count, width, height)).sum(axis=1)
         most = np.inf if self.most is None else self.most
         if self.level == 0.0:
-            log.warning(
-                "the pilot of the target error saw no light: no pixel gets more than %d samples", LEAST
-            )
-            return np.full(len(have), min(LEAST, most), np.int64), True
+            final = count >= min(BLIND, most)
+            if final:
+                log.warning(
+                    "the pilot of the target error saw no light in %d samples a pixel: none gets over %d",
+                    count,
+                    LEAST,
+                )
+            return np.full(len(have), min(LEAST, most), np.int64), final
         # fewer low-discrepancy samples than the pilot's may be noisier than its law, variance / n, says
         least = max(LEAST, count) if self.low_discrepancy else LEAST
         allowed = self.target * self.level

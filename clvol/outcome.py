@@ -32,9 +32,23 @@ def make_result(session: Session, first: int, count: int) -> Result:
     stats = statistics(session, int(samples.sum()))
     pictures = _pictures(session, samples, estimate)
     aovs = {name: values.reshape(*shape, *values.shape[1:]) for name, values in pictures.items()}
-    return Result.from_estimate(
+    result = Result.from_estimate(
         estimate.reshaped(*shape, 3), (first, count), aovs, stats, _metadata(session, first, samples)
     )
+    _warn_of_unseen(session, result)
+    return result
+
+
+def _warn_of_unseen(session: Session, result: Result) -> None:
+    """Say where the samples do not show the noise that there may be."""
+    features = session.config.features
+    if result.stats["largest_sample"] == 0 and (features.emitters or features.emission):
+        log.warning("no sample met any light: the picture may be black by chance, its noise is unknown")
+    elif result.met_nothing and not result.variance.any():
+        log.warning(
+            "no path met anything in the media, and all samples are the same: what is rare there has not "
+            "been seen, and the noise is only a bound"
+        )
 
 
 def _metadata(session: Session, first: int, samples: np.ndarray) -> dict[str, Any]:

@@ -45,6 +45,15 @@ def relative_noise(image: np.ndarray, variance: np.ndarray, dof: float = math.in
     return float(np.sqrt(variance[known]).sum(dtype=np.float64)) / level / error_bias(dof)
 
 
+def unseen_noise(paths: int, samples: int) -> float:
+    """Bound of `relative_noise` where all samples are the same although media might have changed them.
+
+    What none of `paths` paths met has a probability of 3 / paths at most (rule of three, 95 %); if it changes
+    a sample by its own size, the means of `samples` samples have an error of √(3 / (paths · samples)).
+    """
+    return math.sqrt(3 / (max(paths, 1) * max(samples, 1)))
+
+
 @dataclass(eq=False)
 class Result:
     """A rendered picture.
@@ -123,8 +132,24 @@ class Result:
 
     @property
     def noise(self) -> float:
-        """Mean relative standard error of the image (`relative_noise`)."""
-        return relative_noise(self.image, self.variance, self.dof)
+        """Mean relative standard error of the image (`relative_noise`); nan, that is unknown, where no sample
+        met any light.
+
+        Where all samples of each pixel are the same it is 0, unless paths crossed media and met nothing in
+        them: then it is the bound `unseen_noise`.
+        """
+        noise = relative_noise(self.image, self.variance, self.dof)
+        if noise == 0.0 and self.met_nothing:
+            return unseen_noise(self.stats.get("paths", 0), self.samples[1])
+        return noise
+
+    @property
+    def met_nothing(self) -> bool:
+        """Paths crossed media, as far as is known, and no collision was real: what these media do to the
+        picture has not been seen."""
+        analytic = self.metadata.get("technique") == "analytic"
+        crossed = analytic or self.stats.get("cells_crossed", 0) or self.stats.get("lookups", 0)
+        return bool(crossed) and not self.stats.get("real_collisions", 0)
 
     def _repr_png_(self) -> bytes:
         """The picture as a PNG, tone-mapped: how a notebook shows a result."""
