@@ -156,6 +156,13 @@ def mesh_bounds(shape: records.Shape) -> tuple[np.ndarray, np.ndarray]:
     return lower, upper
 
 
+def is_clipped(medium: records.Medium) -> bool:
+    """Whether the box of the sigma_t volume bounds the medium beside its shape."""
+    if medium.homogeneous:
+        return False
+    return not isinstance(medium.sigma_t, records.GridVolume) or medium.sigma_t.clipped
+
+
 def entry_bounds(scene: records.Scene, found: Boundaries) -> list[tuple[np.ndarray, np.ndarray]]:
     """World bounds of each medium: of the shape, or of all boundaries that hold it; infinite where it is
     everywhere."""
@@ -169,6 +176,18 @@ def entry_bounds(scene: records.Scene, found: Boundaries) -> list[tuple[np.ndarr
         lower, upper = zip(*parts, strict=True)
         boxes.append((np.min(lower, axis=0), np.max(upper, axis=0)))
     return boxes
+
+
+def scene_sphere(scene: records.Scene, found: Boundaries) -> tuple[np.ndarray, float]:
+    """Centre and radius of a sphere round every medium and surface: what rays can meet (else the camera's
+    place)."""
+    shapes = [scene.shapes[n] for n in found.surfaces]
+    shapes += [e.shape for e in found.entries if e.shape is not None]
+    corners = [corner for s in shapes for corner in shape_bounds(s)]
+    if not corners:
+        return scene.sensor.to_world[:3, 3].copy(), 1.0
+    lower, upper = np.min(corners, axis=0), np.max(corners, axis=0)
+    return (lower + upper) / 2, float(np.linalg.norm(upper - lower)) / 2
 
 
 def may_overlap(scene: records.Scene, found: Boundaries) -> bool:

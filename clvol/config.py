@@ -151,6 +151,7 @@ class KernelConfig:
             "CLVOL_HAS_HOMOGENEOUS": int(f.homogeneous),
             "CLVOL_HAS_HETEROGENEOUS": int(f.heterogeneous),
             "CLVOL_HAS_CLIPPED": int(f.clipped),
+            "CLVOL_HAS_THIN": int(f.thin),
             "CLVOL_HAS_CUBE": int(f.cubes),
             "CLVOL_HAS_SPHERE": int(f.spheres),
             "CLVOL_HAS_TRILINEAR": int(f.trilinear),

@@ -6,7 +6,13 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from clvol.boundaries import Boundaries, camera_may_be_inside, find_boundaries, may_overlap
+from clvol.boundaries import (
+    Boundaries,
+    camera_may_be_inside,
+    find_boundaries,
+    is_clipped,
+    may_overlap,
+)
 from clvol.material_facts import (
     bsdf_kinds,
     bsdf_sides,
@@ -24,6 +30,7 @@ from clvol.scene import records
 from clvol.scene.materials import Bsdf
 from clvol.scene.phase import phase_lobes
 from clvol.scene.primitives import canonical_mesh
+from clvol.thinness import thin_media
 from clvol.volumes.grid import DenseGrid
 
 QUADRICS = ("sphere", "disk", "cylinder")
@@ -51,6 +58,7 @@ class Features:
     homogeneous: bool = False
     heterogeneous: bool = False
     clipped: bool = False
+    thin: bool = False
     media_overlap: bool = False
     chromatic_extinction: bool = False
     coloured_extinction: bool = False
@@ -129,6 +137,7 @@ class Features:
             homogeneous=any(homogeneous),
             heterogeneous=not all(homogeneous),
             clipped=any(is_clipped(m) for m in media) or _clips_homogeneous(found),
+            thin=any(thin_media(scene, found)),
             media_overlap=may_overlap(scene, found),
             chromatic_extinction=any(not _is_grey(m.sigma_t) or len(set(m.scale)) > 1 for m in media),
             coloured_extinction=any(
@@ -256,13 +265,6 @@ def medium_volumes(medium: records.Medium) -> list[records.GridVolume]:
 def is_homogeneous(medium: records.Medium) -> bool:
     """Whether sigma_t is the same everywhere inside (the albedo may still vary)."""
     return isinstance(medium.sigma_t, records.ConstVolume)
-
-
-def is_clipped(medium: records.Medium) -> bool:
-    """Whether the box of the sigma_t volume bounds the medium beside its shape."""
-    if medium.homogeneous:
-        return False
-    return not isinstance(medium.sigma_t, records.GridVolume) or medium.sigma_t.clipped
 
 
 def bounding_kind(shape: records.Shape) -> str:

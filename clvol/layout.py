@@ -40,6 +40,7 @@ MEDIUM = _record(
     ("shape_kind", "i", 1),  # SHAPE_NONE (the box alone, or boundaries bound it), SHAPE_CUBE, SHAPE_SPHERE
     ("presence", "i", 1),  # how often it is present outside every boundary
     ("homogeneous", "i", 1),
+    ("thin", "i", 1),  # so thin beside the scene that rays are measured from close by
     ("clipped", "i", 1),  # 1: also bounded by box_lower..box_upper under box_from_world
     ("box_from_world", "f", 12),
     ("box_lower", "f", 3),

@@ -6,11 +6,12 @@ import numpy as np
 
 from clvol import layout
 from clvol.blackbody import blackbody_rgb
-from clvol.boundaries import MediumEntry, entry_bounds
-from clvol.features import bounding_kind, is_clipped, is_homogeneous
+from clvol.boundaries import MediumEntry, entry_bounds, is_clipped
+from clvol.features import bounding_kind, is_homogeneous
 from clvol.prepare import PreparedScene, PreparedVolume
 from clvol.scene import records
 from clvol.scene.phase import phase_lobes
+from clvol.thinness import thin_media
 
 BOUND_SLACK = 1e-5
 """Share of its size by which a medium's world box exceeds the boundaries that hold it."""
@@ -35,8 +36,10 @@ def medium_table(prepared: PreparedScene, volumes: dict[int, int], step: float |
     cell_offset = kd_root = phase_first = 0
     incident = mean_incident_radiance(prepared.scene) * (prepared.surfaces is None)
     boxes = entry_bounds(prepared.scene, prepared.boundaries)
-    for record, entry, box in zip(table, entries, boxes, strict=True):
+    thin = thin_media(prepared.scene, prepared.boundaries)
+    for record, entry, box, is_thin in zip(table, entries, boxes, thin, strict=True):
         medium = entry.medium
+        record["thin"] = int(is_thin)
         record["presence"] = int(entry.shape is not None or entry.everywhere)
         if entry.shape is not None:
             record["shape_from_world"] = rows_3x4(_from_centred(entry.shape.to_world, prepared.centre))

@@ -11,10 +11,10 @@ import numpy as np
 from clvol.accel import choice, controls
 from clvol.accel.bounds import Bounds, with_slack
 from clvol.accel.kdtree import KdTree, build_kdtree, pack_maximum, tree_lattice, unpack_maximum
-from clvol.boundaries import Boundaries, find_boundaries, shape_bounds
+from clvol.boundaries import Boundaries, find_boundaries, is_clipped, scene_sphere
 from clvol.camera_medium import check_camera_medium
 from clvol.errors import SceneError
-from clvol.features import Features, is_clipped, is_homogeneous, medium_volumes
+from clvol.features import Features, is_homogeneous, medium_volumes
 from clvol.scene import records
 from clvol.surfaces import Surfaces, prepare_surfaces
 from clvol.volumes.bricks import BOUND_CELLS, BrickMap, build_bricks
@@ -108,7 +108,7 @@ def prepare(scene: records.Scene, needs: MajorantNeeds | None = None) -> Prepare
     features = Features.from_scene(scene)
     found = find_boundaries(scene)
     check_camera_medium(scene, found)
-    centre, radius = _scene_sphere(scene, found)
+    centre, radius = scene_sphere(scene, found)
     volumes = {}
     for medium in (entry.medium for entry in found.entries):
         for volume in medium_volumes(medium):
@@ -121,18 +121,6 @@ def prepare(scene: records.Scene, needs: MajorantNeeds | None = None) -> Prepare
     return PreparedScene(
         scene, features, found, centre, radius, surfaces, volumes, needs, majorant, majorants
     )
-
-
-def _scene_sphere(scene: records.Scene, found: Boundaries) -> tuple[np.ndarray, float]:
-    """Centre and radius of a sphere round every medium and surface: what rays can meet (else the camera's
-    place)."""
-    shapes = [scene.shapes[n] for n in found.surfaces]
-    shapes += [e.shape for e in found.entries if e.shape is not None]
-    corners = [corner for s in shapes for corner in shape_bounds(s)]
-    if not corners:
-        return scene.sensor.to_world[:3, 3].copy(), 1.0
-    lower, upper = np.min(corners, axis=0), np.max(corners, axis=0)
-    return (lower + upper) / 2, float(np.linalg.norm(upper - lower)) / 2
 
 
 def _prepare_volume(volume: records.GridVolume, centre: np.ndarray) -> PreparedVolume:

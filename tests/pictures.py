@@ -145,6 +145,14 @@ def deviations(result, expected):
     return pixels, np.abs(z_score(mean, error**2, expected.mean((0, 1))))
 
 
+def assert_mean(result, expected, bias=0.005):
+    """The image mean of one channel is within half of `bias` of what is expected, beyond doubt."""
+    mean, error = (float(a[0]) for a in mean_and_error(result))
+    doubt = largest_z(1) * error
+    assert doubt < bias / 2 * expected, "too noisy"
+    assert abs(mean - expected) < bias / 2 * expected + doubt, f"{mean} for {expected}"
+
+
 def assert_matches(result, expected, bias=0.005, alpha=FALSE_ALARM):
     """Every pixel and the image mean agree with the expected picture, and nobody lost energy unseen.
 

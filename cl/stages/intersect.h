@@ -27,18 +27,17 @@ INLINE void intersect(const Scene *scene, uint group, uint slot)
 #endif
 #if CLVOL_HAS_STRETCHES
     const Inside inside = get_inside(scene, slot);
-    Part part = {-1, 0.0f, 0.0f};
+    Part part = {-1, 0.0f, {0.0f, 0.0f, 0.0f}};
     if (next_part(scene, ray, &inside, path_after(scene, slot), stretch_end(scene, slot, ray),
                   ray_limit(scene, slot, ray), &part)) {
         queue_push(scene, group, QUEUE_MEDIUM, slot);
         return;
     }
 #elif CLVOL_HAS_MEDIA
-    float start = 0.0f, end = INFINITY;
-    medium_interval(scene->media, ray, &start, &end);
-    if (start < end && start < ray_limit(scene, slot, ray)) {
-        set_path_origin(scene, slot, ray.o + start * ray.d);
-        set_path_interval_end(scene, slot, end - start);
+    Span span;
+    if (medium_span(scene->media, ray, 0.0f, INFINITY, &span) && span_t(&span) < ray_limit(scene, slot, ray)) {
+        set_path_origin(scene, slot, span_point(&span, ray));
+        set_path_interval_end(scene, slot, span.end - span.start);
         queue_push(scene, group, QUEUE_MEDIUM, slot);
         return;
     }

@@ -20,36 +20,34 @@ INLINE int medium_presence(const Scene *scene, uint m, const Inside *inside)
 }
 
 /* The part of the ray between `from` and `to` that lies in medium m; false where there is none. */
-INLINE bool medium_part(const Scene *scene, uint m, Ray ray, const Inside *inside, float from, float to, float *t0,
-                        float *t1)
+INLINE bool medium_part(const Scene *scene, uint m, Ray ray, const Inside *inside, float from, float to, Span *span)
 {
-    *t0 = from;
-    *t1 = to;
     if (CLVOL_BOUNDARY_WORDS > 0 && medium_presence(scene, m, inside) <= 0)
         return false;
-    medium_interval(scene->media + m, ray, t0, t1);
-    return *t0 < *t1;
+    return medium_span(scene->media + m, ray, from, to, span);
 }
 
 /* One medium on a stretch of a ray. */
 typedef struct {
     int medium; /* -1: none yet */
-    float start, end;
+    float start; /* ray parameter */
+    Span span;
 } Part;
 
 /* The next part, in the order of entry, ties by number, that begins before `limit`; false at the last. */
 INLINE bool next_part(const Scene *scene, Ray ray, const Inside *inside, float from, float to, float limit, Part *part)
 {
-    Part next = {-1, limit, limit};
+    Part next = {-1, limit, {0.0f, limit, limit}};
     for (int m = 0; m < (int)scene->render->media; ++m) {
-        float t0, t1;
-        if (!medium_part(scene, (uint)m, ray, inside, from, to, &t0, &t1))
+        Span span;
+        if (!medium_part(scene, (uint)m, ray, inside, from, to, &span))
             continue;
+        const float t0 = span_t(&span);
         const bool is_later = part->medium < 0 || t0 > part->start || (t0 == part->start && m > part->medium);
         if (is_later && t0 < next.start) {
             next.medium = m;
             next.start = t0;
-            next.end = t1;
+            next.span = span;
         }
     }
     *part = next;

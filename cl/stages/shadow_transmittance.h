@@ -21,13 +21,13 @@ INLINE bool media_transmittance(const Scene *scene, SampleKey key, Ray ray, cons
                                 float to, int channel, Tally *tally, Extinction *transmittance)
 {
     for (uint m = 0; m < (CLVOL_HAS_MANY_MEDIA ? scene->render->media : 1u); ++m) {
-        float t0, t1;
-        if (!medium_part(scene, m, ray, inside, from, to, &t0, &t1))
+        Span span;
+        if (!medium_part(scene, m, ray, inside, from, to, &span))
             continue;
         const uint4 k = decision_block(scene, key, BLOCK_SHADOW, walk_number(scene, stretch, (int)m));
         Ray start = ray;
-        start.o += t0 * ray.d;
-        const MediumRay in = part_ray(scene, inside, (int)m, start, t1 - t0, channel);
+        start.o = span_point(&span, ray);
+        const MediumRay in = part_ray(scene, inside, (int)m, start, span.end - span.start, channel);
         *transmittance *= medium_transmittance(&in, k, tally);
         if (extinction_max(*transmittance) == 0.0f)
             return false;

@@ -35,6 +35,7 @@ INLINE void medium_sample(const Scene *scene, uint group, uint slot)
     Spectrum beta = before, winning = before;
     float limit = min_of(to, ray_limit(scene, slot, ray)); /* nothing that begins beyond counts */
     float reach = to;
+    float3 end = ray.o;
     int winner = -1;
     for (int pass = 0; pass < (JOINT_WEIGHTS ? 2 : 1); ++pass) {
         if (pass == 1) {
@@ -42,14 +43,15 @@ INLINE void medium_sample(const Scene *scene, uint group, uint slot)
                 break;
             beta = winning;
         }
-        Part part = {-1, 0.0f, 0.0f};
+        Part part = {-1, 0.0f, {0.0f, 0.0f, 0.0f}};
         while (next_part(scene, ray, &inside, from, to, limit, &part)) {
             if (pass == 1 && part.medium == winner)
                 continue;
             Ray start = ray;
-            start.o += part.start * ray.d;
-            const MediumRay in = part_ray(scene, &inside, part.medium, start, min_of(part.end, reach) - part.start,
-                                          (int)path_channel_or_zero(scene, slot));
+            start.o = span_point(&part.span, ray);
+            const float length = min_of(part.span.end - part.span.start, reach - part.start);
+            const MediumRay in =
+                part_ray(scene, &inside, part.medium, start, length, (int)path_channel_or_zero(scene, slot));
             const uint4 k = decision_block(scene, key, BLOCK_WALK, walk_number(scene, stretch, part.medium));
             collision.beta = JOINT_WEIGHTS ? before : beta;
             const bool collided = medium_collision(&in, k, &tally, &collision);
@@ -58,13 +60,14 @@ INLINE void medium_sample(const Scene *scene, uint group, uint slot)
                 winner = part.medium;
                 winning = collision.beta;
                 limit = reach = part.start + collision.t;
+                end = CLVOL_HAS_THIN ? start.o + collision.t * ray.d : ray.o + reach * ray.d;
                 if (!CLVOL_HAS_OVERLAP)
                     break;
             }
         }
     }
 #if CLVOL_WEIGHTED
-    Part first = {-1, 0.0f, 0.0f};
+    Part first = {-1, 0.0f, {0.0f, 0.0f, 0.0f}};
     if (next_part(scene, ray, &inside, from, to, INFINITY, &first))
         subtract_background(scene, slot, scene->media + first.medium, (int)path_channel_or_zero(scene, slot), beta);
 #endif
@@ -73,7 +76,7 @@ INLINE void medium_sample(const Scene *scene, uint group, uint slot)
 #if CLVOL_HAS_MANY_MEDIA
         set_path_medium(scene, slot, winner);
 #endif
-        set_path_origin(scene, slot, ray.o + reach * ray.d);
+        set_path_origin(scene, slot, end);
         set_path_event(scene, slot, EVENT_COLLISION);
     }
     queue_push(scene, group, QUEUE_SHADE, slot);
