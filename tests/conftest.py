@@ -9,23 +9,40 @@ import pytest
 SCENES = Path(__file__).resolve().parent.parent / "scenes"
 
 
+OTHERS = {
+    "mitsuba": ("Mitsuba 3.9", "CLVOL_MITSUBA"),
+    "openvdb": ("OpenVDB 12", "CLVOL_OPENVDB"),
+}
+"""Programs that tests compare with when asked to, since they may have to be installed: marker and option, the
+program's name, and the variable that names a Python that has it."""
+
+
 def pytest_addoption(parser):
-    parser.addoption(
-        "--mitsuba",
-        action="store_true",
-        help="compare with Mitsuba 3.9 too, in an environment made for it unless CLVOL_MITSUBA names a "
-        "Python that has it",
-    )
+    for option, (program, variable) in OTHERS.items():
+        parser.addoption(
+            f"--{option}",
+            action="store_true",
+            help=f"compare with {program} too, in an environment made for it unless {variable} names a "
+            "Python that has it",
+        )
+
+
+def pytest_configure(config):
+    for option, (program, variable) in OTHERS.items():
+        config.addinivalue_line(
+            "markers", f"{option}: compares with {program}; skipped but for --{option}, or {variable}"
+        )
 
 
 def pytest_collection_modifyitems(config, items):
-    """Tests marked `mitsuba` run when asked for: they take minutes, and may install Mitsuba."""
-    if config.getoption("--mitsuba") or os.environ.get("CLVOL_MITSUBA"):
-        return
-    skip = pytest.mark.skip(reason="compares with Mitsuba 3.9: give --mitsuba, or set CLVOL_MITSUBA")
-    for item in items:
-        if item.get_closest_marker("mitsuba"):
-            item.add_marker(skip)
+    """Tests that compare with other programs run when asked for: they may take minutes, and install them."""
+    for option, (program, variable) in OTHERS.items():
+        if config.getoption(f"--{option}") or os.environ.get(variable):
+            continue
+        skip = pytest.mark.skip(reason=f"compares with {program}: give --{option}, or set {variable}")
+        for item in items:
+            if item.get_closest_marker(option):
+                item.add_marker(skip)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -218,6 +218,20 @@ def test_inactive_values_of_half_grids_keep_full_width(tmp_path):
     assert (read[active] == np.float32(np.float16(0.1))).all()
 
 
+def test_what_is_half_is_said_by_metadata_as_openvdb_reads_it(tmp_path):
+    values, active = leaf([2], 3)
+    for options in (
+        {"value_type": "int32", "half": True, "grid_type": "Tree_int32_5_4_3_HalfFloat"},
+        {"value_type": "float", "half": False, "grid_type": "Tree_float_5_4_3_HalfFloat"},
+        {"value_type": "float", "half": True, "grid_type": "Tree_float_5_4_3"},
+    ):
+        spec = GridSpec(background=2, leaves={(0, 0, 0): (values, active)}, **options)
+        write_vdb(tmp_path / "a.vdb", [spec])
+        assert np.array_equal(read_vdb(tmp_path / "a.vdb").leaf_values[0], values.transpose(2, 1, 0)), options
+        halved = options["half"] and options["value_type"] == "float"
+        assert list_vdb(tmp_path / "a.vdb")[0].half == halved
+
+
 def test_active_box_is_that_of_active_samples_only(tmp_path):
     values, active = np.ones((8, 8, 8)), np.zeros((8, 8, 8), bool)
     active[1:3, 4, 5:7] = True
@@ -300,7 +314,9 @@ def test_list_tells_what_the_file_says_without_reading_trees(tmp_path):
     frustum = ("NonlinearFrustumMap", [1.0] * 30)
     grids = [
         rich_grid(name="a", half=True, compression=BLOSC | ACTIVE_MASK, metadata=metadata(77)),
-        GridSpec(name="v", grid_type="Tree_vec3s_5_4_3_HalfFloat", compression=ZIP, transform=frustum),
+        GridSpec(
+            name="v", grid_type="Tree_vec3s_5_4_3_HalfFloat", half=True, compression=ZIP, transform=frustum
+        ),
         GridSpec(name="p", grid_type="Tree_ptdataidx32_5_4_3"),
     ]
     data = bytearray(write_vdb(tmp_path / "a.vdb", grids))

@@ -79,12 +79,11 @@ def test_names_that_a_careless_writer_repeats_are_numbered(tmp_path, caplog):
 
 
 def test_a_name_that_ends_like_a_number_is_a_name(tmp_path):
-    grids = [
-        GridSpec(name=name, tiles=[((0, 0, 0), 8, value, True)]) for name, value in (("a[0]", 1), ("a", 2))
-    ]
+    names = {"a": 1, "a\x1e1": 2, "a[1]": 3, "b[0]": 4, "b": 5}
+    grids = [GridSpec(name=name, tiles=[((0, 0, 0), 8, value, True)]) for name, value in names.items()]
     write_vdb(tmp_path / "a.vdb", grids)
-    assert read_vdb(tmp_path / "a.vdb", "a[0]").tile_values == [1]
-    assert read_vdb(tmp_path / "a.vdb", "a").tile_values == [2]
+    for name, value in names.items():
+        assert read_vdb(tmp_path / "a.vdb", name).tile_values == [value]
 
 
 def test_grids_before_the_place_where_a_file_is_cut_are_found(tmp_path):

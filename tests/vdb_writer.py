@@ -49,6 +49,16 @@ class GridSpec:
         return LETTERS[self.value_type]
 
     @property
+    def halved(self) -> bool:
+        """Values are stored as halves, which whole numbers never are, whatever the grid says."""
+        return self.half and self.letter in "fd"
+
+    @property
+    def all_metadata(self) -> list[tuple[str, str, bytes]]:
+        """The grid's metadata, with that by which OpenVDB knows whether values are halves."""
+        return [*self.metadata, ("is_saved_as_half_float", "bool", b"\x01")] if self.half else self.metadata
+
+    @property
     def type_name(self) -> str:
         """Grid type as the file names it."""
         return self.grid_type or f"Tree_{self.value_type}_5_4_3" + "_HalfFloat" * self.half
@@ -66,7 +76,7 @@ def write_vdb(path, grids: Sequence[GridSpec], version: int = 224, has_offsets: 
         out += bytes(24)
         start = len(out)
         kind, doubles = grid.transform
-        out += struct.pack("<I", grid.compression) + _metadata(grid.metadata)
+        out += struct.pack("<I", grid.compression) + _metadata(grid.all_metadata)
         out += _string(kind) + struct.pack(f"<{len(doubles)}d", *doubles)
         topology, buffers = (b"", b"") if grid.parent else _tree(grid)
         out += topology
@@ -108,11 +118,11 @@ def _mask(bits: np.ndarray) -> bytes:
 
 
 def _block(values: np.ndarray, grid: GridSpec) -> bytes:
-    if grid.half and not values.size:
+    if grid.halved and not values.size:
         return b""
-    raw = values.astype("<f2" if grid.half else "<" + grid.letter).tobytes()
+    raw = values.astype("<f2" if grid.halved else "<" + grid.letter).tobytes()
     if grid.compression & BLOSC:
-        packed = blosc.compress(raw, typesize=2 if grid.half else 4, cname="lz4")
+        packed = blosc.compress(raw, typesize=2 if grid.halved else 4, cname="lz4")
     elif grid.compression & ZIP:
         packed = zlib.compress(raw)
     else:

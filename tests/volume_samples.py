@@ -23,6 +23,25 @@ def samples_in_box(grid: SparseGrid, lower, upper) -> np.ndarray:
     return out
 
 
+def probe(grid: SparseGrid, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Values and states (active or not) of the samples at places, int (n, 3) x y z."""
+    values = np.full(len(places), grid.background, np.float32)
+    active = np.zeros(len(places), bool)
+    for origin, size, value, on in zip(
+        grid.tile_origins, grid.tile_sizes, grid.tile_values, grid.tile_active, strict=True
+    ):
+        inside = ((places >= origin) & (places < origin + size)).all(axis=1)
+        values[inside], active[inside] = value, on
+    leaves = {tuple(origin): number for number, origin in enumerate(grid.leaf_origins.tolist())}
+    found = np.array([leaves.get(tuple(origin), -1) for origin in (places // 8 * 8).tolist()])
+    held = np.flatnonzero(found >= 0)
+    x, y, z = (places[held] % 8).T
+    values[held] = grid.leaf_values[found[held], z, y, x]
+    bits = np.unpackbits(grid.leaf_active, axis=1, bitorder="little").reshape(-1, 8, 8, 8)
+    active[held] = bits[found[held], x, y, z]
+    return values, active
+
+
 def active_samples(grid: SparseGrid) -> tuple[np.ndarray, np.ndarray]:
     """Values of the active samples and how many samples each stands for (512 or more for tiles)."""
     bits = np.unpackbits(grid.leaf_active, axis=1, bitorder="little").view(bool)

@@ -27,6 +27,8 @@ log = logging.getLogger("clvol")
 
 # OpenVDB's names of the voxel types that convert to float32, with the letters of struct and NumPy.
 VALUE_TYPES = {"float": "f", "double": "d", "int32": "i", "int64": "q"}
+# Those that are stored as halves where a grid says so; others may say it too.
+HALVED = ("float", "double", "vec3s", "vec3d")
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +80,7 @@ def list_vdb(path: str | os.PathLike[str]) -> list[VdbGridInfo]:
                 VdbGridInfo(
                     name=descriptor.name,
                     value_type=descriptor.value_type,
-                    half=descriptor.half,
+                    half=header.half and descriptor.value_type in HALVED,
                     compression=flags,
                     active_box=header.active_box,
                     active_voxels=header.active_voxels,
@@ -120,7 +122,7 @@ def read_vdb(
         index_to_world = check_transform(stream, header)
         if data is not descriptor:
             header = read_grid_header(stream, data)
-        tree = VdbTree(stream, code, data.half, header.compression, max_bytes)
+        tree = VdbTree(stream, code, header.half and code in "fd", header.compression, max_bytes)
         tree.read()
         if stream.pos != data.end_pos:
             stream.fail(f"its tree ends at byte {stream.pos}, the directory says {data.end_pos}")
@@ -175,6 +177,7 @@ def _directory(stream: VdbStream) -> tuple[list[Descriptor], VolumeError | None]
 def _named(stream: VdbStream, entries: list[Descriptor], name: str) -> list[Descriptor]:
     """Those entries that a name means, the first of which is taken.  "density[0]" is the first "density"."""
     exact = [entry for entry in entries if name in (entry.name, entry.unique_name)]
+    exact.sort(key=lambda entry: entry.plain_name != name)  # one that is called "density[1]" comes first
     alike = [entry for entry in entries if entry.plain_name == name]
     if len(alike) > 1:
         names = ", ".join([f"{name}[0]", *(entry.name for entry in alike[1:])])
@@ -191,7 +194,7 @@ def _named(stream: VdbStream, entries: list[Descriptor], name: str) -> list[Desc
 def _value_code(stream: VdbStream, descriptor: Descriptor) -> str:
     """Letter of the grid's values; VolumeError if they are not scalars that become float32."""
     code = VALUE_TYPES.get(descriptor.value_type)
-    if code is None or (descriptor.half and code not in "fd"):
+    if code is None:
         stream.fail(
             f"its values are {descriptor.grid_type!r}, which is not supported",
             f"choose a grid of {', '.join(VALUE_TYPES)} values",

@@ -56,11 +56,6 @@ class Descriptor:
         return grid_name(self.unique_name)
 
     @property
-    def half(self) -> bool:
-        """Active values are stored as 16-bit floats."""
-        return self.grid_type.endswith("_HalfFloat")
-
-    @property
     def value_type(self) -> str:
         """Name of the voxel type: "float", "vec3s", …; the whole type for other trees than 5-4-3."""
         found = re.fullmatch(r"Tree_(\w+)_5_4_3", self.grid_type.removesuffix("_HalfFloat"))
@@ -75,9 +70,13 @@ def grid_name(unique_name: str) -> str:
 
 @dataclass(frozen=True)
 class GridHeader:
-    """What a grid says before its tree; `index_to_world` is None for a map that is not affine."""
+    """What a grid says before its tree; `index_to_world` is None for a map that is not affine.
+
+    half : floats and doubles are stored as 16-bit floats.  OpenVDB goes by this, not by the type's suffix.
+    """
 
     compression: int
+    half: bool
     active_box: np.ndarray | None
     active_voxels: int | None
     transform: str
@@ -168,6 +167,7 @@ def read_grid_header(stream: VdbStream, descriptor: Descriptor) -> GridHeader:
     transform = stream.string()
     return GridHeader(
         compression=compression,
+        half=any(metadata.get("is_saved_as_half_float", b"")),
         active_box=box,
         active_voxels=struct.unpack("<q", voxels)[0] if len(voxels) == 8 else None,
         transform=transform,
