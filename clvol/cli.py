@@ -254,7 +254,7 @@ def info(file: str, grid: str | None, definitions: tuple[tuple[str, str], ...]) 
         if definitions:
             raise click.UsageError("-D fills a scene's $NAMES, and this is a volume file")
         lines = describe.describe_volume(file, grid)
-    tell(lines)
+    tell(map(printable, lines))  # a line of names with line breaks in them is one line
 
 
 @main.command()
