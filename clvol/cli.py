@@ -15,15 +15,16 @@ import click
 
 from clvol.cli_compare import compare
 from clvol.cli_options import (
-    INTERRUPTED,
     OneLineErrors,
     RenderCommand,
     SampleRange,
     choice_options,
     definitions_option,
     device_option,
+    exit_by,
     finite,
     majorant_scale_option,
+    mention,
     positive_option,
     quiet_option,
     step_option,
@@ -144,11 +145,9 @@ def render(
 ) -> None:
     """Render SCENE, a Mitsuba 3 XML file, into one or more pictures.
 
-    Ctrl-C ends the render early and keeps the picture so far.
+    Ctrl-C ends the render early and keeps the picture so far; so do SIGTERM and SIGHUP.
     """
-    from rich.console import Console
-
-    from clvol.progress import RichProgress
+    from clvol.progress import RichProgress, error_console
     from clvol.saving import check_disk, check_picture, save_all
 
     if spp is not None and time_limit is not None:
@@ -157,7 +156,7 @@ def render(
         check_picture(output, exposure)
     if options["aov"] and not any(output.lower().endswith(".exr") for output in outputs):
         raise click.UsageError("--aov needs an .exr to write to")
-    console = Console(stderr=True)
+    console = error_console()
     with _logging_to(console, verbose):
         import clvol
 
@@ -169,7 +168,7 @@ def render(
         if piloted and not quiet and not console.is_terminal:
             from clvol.measure.repeat import announcement
 
-            click.echo(announcement(loaded, options), err=True)
+            mention([announcement(loaded, options)], err=True)
         with nullcontext(False) if quiet else RichProgress(console) as progress:
             result = clvol.render(loaded, spp=spp, time_limit=time_limit, progress=progress, **options)
         if piloted:
@@ -177,15 +176,15 @@ def render(
 
             result.metadata["repeat"] = with_definitions(result.metadata["repeat"], dict(definitions))
         failures = save_all(result, outputs, exposure)
-    interrupted = bool(result.stats.get("interrupted"))
-    if interrupted:
-        click.echo(f"clvol: interrupted after {result.samples[1]} spp, saved what there is", err=True)
+    written = [output for output in outputs if output not in failures]
+    if result.stats["interrupted"]:
+        saved = ", saved what there is" if written else ""
+        mention([f"clvol: interrupted after {result.samples[1]} spp{saved}"], err=True)
     if not quiet:
-        written = [output for output in outputs if output not in failures]
-        tell(_summary(result, written))
+        mention(_summary(result, written))
     for failure in failures.values():
         raise failure
-    click.get_current_context().exit(INTERRUPTED if interrupted else 0)
+    exit_by(result.stats["interrupted"])
 
 
 @contextmanager

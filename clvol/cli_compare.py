@@ -8,14 +8,14 @@ from typing import Any
 import click
 
 from clvol.cli_options import (
-    INTERRUPTED,
     ExplainedCommand,
     RegistryChoice,
     definitions_option,
     device_option,
+    exit_by,
+    mention,
     positive_option,
     quiet_option,
-    tell,
 )
 
 EXAMPLES = """
@@ -113,17 +113,16 @@ def compare(
     Every combination of the names given is rendered by turns and compared with one reference. The FOLDER gets
     report.html, report.json, plots and the reference. Ctrl-C ends the rounds early and still writes them.
     """
-    from rich.console import Console
-
     from clvol.comparison.bar import Bar
     from clvol.comparison.report import check_folder, write_or_keep
+    from clvol.progress import error_console
 
     if options["spp"] is not None and options["time_limit"] is not None:
         raise click.UsageError("give --spp or --time, not both")
     if options["reference"] is not None and options["reference_spp"] is not None:
         raise click.UsageError("give --reference or --reference-spp, not both")
     check_folder(output)
-    console = Console(stderr=True)
+    console = error_console()
     from clvol.cli import _logging_to
 
     with _logging_to(console, verbose=False):
@@ -136,12 +135,11 @@ def compare(
         comparison.about["command"] = shlex.join(["clvol", "compare", *arguments])
         write_or_keep(comparison, output)
     if comparison.interrupted:
-        click.echo(
-            f"clvol: interrupted after {comparison.about['rounds']} rounds, saved what there is", err=True
-        )
+        rounds = comparison.about["rounds"]
+        mention([f"clvol: interrupted after {rounds} rounds, saved what there is"], err=True)
     if not quiet:
-        tell([repr(comparison), "", *comparison.words, "", f"{output}: report.html"])
-    click.get_current_context().exit(INTERRUPTED if comparison.interrupted else 0)
+        mention([repr(comparison), "", *comparison.words, "", f"{output}: report.html"])
+    exit_by(comparison.interrupted)
 
 
 def _run(compared: Any, scene: Any, progress: Any, options: dict[str, Any]) -> Any:

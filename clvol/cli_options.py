@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import io
 import math
+import os
 import sys
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from typing import Any, NoReturn
 
 import click
 
 from clvol.errors import DeviceError, Error, OptionError, printable, shortened
+from clvol.interrupts import ENDING, interruptible
 
 USER_ERROR = 2
 LONGEST_LINE = 3000
 """Characters of an error's line at most, whatever was on the command line."""
 PILOT_HELP = [("auto:pilot", "measures, then picks the technique, transmittance and majorant left at auto")]
-INTERRUPTED = 130
 
 
 class OneLineErrors(click.Group):
@@ -35,36 +37,53 @@ class OneLineErrors(click.Group):
             return super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
         if isinstance(sys.stdout, io.TextIOWrapper):  # whatever the encoding, a summary is no reason to fail
             sys.stdout.reconfigure(errors="backslashreplace")
-        try:
-            status = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
-        except click.UsageError as error:
-            fail(_usage_message(error))
-        except click.ClickException as error:
-            fail(error.format_message())
-        except DeviceError as error:
-            fail(str(error), whole=True)
-        except Error as error:
-            fail(str(error))
-        except OSError as error:
-            fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
-        except MemoryError as error:
-            fail(f"out of memory: {error}" if str(error) else "out of memory")
-        except click.Abort:
-            click.echo("clvol: interrupted, nothing was written", err=True)
-            sys.exit(INTERRUPTED)
-        sys.exit(status if isinstance(status, int) else 0)
+        with interruptible(ENDING) as interrupt:
+            try:
+                status = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
+            except click.UsageError as error:
+                fail(_usage_message(error))
+            except click.ClickException as error:
+                fail(error.format_message())
+            except DeviceError as error:
+                fail(str(error), whole=True)
+            except Error as error:
+                fail(str(error))
+            except OSError as error:
+                fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
+            except MemoryError as error:
+                fail(f"out of memory: {error}" if str(error) else "out of memory")
+            except click.Abort:
+                mention(["clvol: interrupted"], err=True)
+                sys.exit(interrupt.status)
+            sys.exit(status if isinstance(status, int) else 0)
 
 
 def fail(message: str, whole: bool = False) -> NoReturn:
     """Print one line on standard error, or the `whole` text (a build log), and exit with status 2."""
     line = message if whole else printable(shortened(" ".join(message.split()), LONGEST_LINE))
-    click.echo(f"clvol: error: {line}", err=True)
+    mention([f"clvol: error: {line}"], err=True)
     sys.exit(USER_ERROR)
 
 
-def tell(lines: Iterable[str]) -> None:
-    """Print lines on standard output, whatever names are in them."""
-    click.echo("\n".join(printable(line) for text in lines for line in text.split("\n")))
+def tell(lines: Iterable[str], err: bool = False) -> None:
+    """Print lines on standard output (or error), whatever names are in them."""
+    single = (line.expandtabs() for text in lines for line in text.split("\n"))
+    click.echo("\n".join(map(printable, single)), err=err)
+
+
+def mention(lines: Iterable[str], err: bool = False) -> None:
+    """As `tell`, where it is no failure if nobody can read it: the terminal was closed, a pipe broke."""
+    try:
+        tell(lines, err)
+    except OSError:
+        with suppress(OSError, ValueError):  # or the interpreter fails on it when it exits
+            os.dup2(os.open(os.devnull, os.O_WRONLY), (sys.stderr if err else sys.stdout).fileno())
+
+
+def exit_by(ended_early: bool) -> NoReturn:
+    """Exit as the signal says that ended the work, or came while it was saved; with 0 if there was none."""
+    with interruptible() as interrupt:
+        sys.exit(interrupt.status if ended_early or interrupt.asked() else 0)
 
 
 def _usage_message(error: click.UsageError) -> str:

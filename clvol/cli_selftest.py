@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import sys
 import textwrap
 from typing import TYPE_CHECKING
 
 import click
 
-from clvol.cli_options import INTERRUPTED, definitions_option, device_option, positive_option
+from clvol.cli_options import definitions_option, device_option, exit_by, mention, positive_option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -68,11 +69,11 @@ def selftest(
 
     import clvol
     from clvol.measure.selftests import selftest as run
+    from clvol.progress import error_console
 
     loaded = clvol.load_file(scene, **dict(definitions))
-    context = click.get_current_context()
     try:
-        with _Steps(Console(stderr=True)) as steps:
+        with _Steps(error_console()) as steps:
             found = run(
                 loaded,
                 quick=quick,
@@ -83,13 +84,15 @@ def selftest(
                 progress=steps.tell,
             )
     except KeyboardInterrupt:
-        click.echo("clvol: interrupted before the second round: no verdict", err=True)
-        context.exit(INTERRUPTED)
+        mention(["clvol: interrupted before the second round: no verdict"], err=True)
+        exit_by(True)
     console = Console()
     width = console.width if console.is_terminal else 0  # a file or a pipe has no width to keep to
     lines = [*table_of(found, width), "", *(line for note in notes(found) for line in wrapped(note, width))]
     click.echo("\n".join(lines))
-    context.exit(1 if not found.passed else INTERRUPTED if found.interrupted_of else 0)
+    if not found.passed:
+        sys.exit(1)
+    exit_by(bool(found.interrupted_of))
 
 
 class _Steps:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -92,6 +94,34 @@ def format_seconds(seconds: float) -> str:
     return f"{minutes}:{rest:02}" if minutes else f"{rest} s"
 
 
+class _Lasting:
+    """Standard error without its failures: a terminal that is gone, or a full disk, is no end of a render."""
+
+    def __init__(self) -> None:
+        self._stream = sys.stderr
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        """As of any stream, but silent where that fails."""
+        with suppress(OSError):
+            self._stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        """As of any stream, but silent where that fails."""
+        with suppress(OSError):
+            self._stream.flush()
+
+
+def error_console() -> Console:
+    """Standard error, for bars and messages of long work, which does not end with it."""
+    from rich.console import Console
+
+    return Console(file=_Lasting())
+
+
 class RichProgress:
     """Progress bar on standard error: samples done, time left and noise; silent where that is no terminal.
 
@@ -99,9 +129,7 @@ class RichProgress:
     """
 
     def __init__(self, console: Console | None = None) -> None:
-        from rich.console import Console
-
-        self.console = console or Console(stderr=True)
+        self.console = console or error_console()
         self._bar: RichBar | None = None
         self._task: TaskID | None = None
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 import logging
 import math
 import operator
-import signal
-import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +17,7 @@ from clvol.arguments import check_seed, positive
 from clvol.choices import Choices
 from clvol.device import Device, open_device
 from clvol.errors import OptionError, shown
+from clvol.interrupts import interruptible
 from clvol.progress import Progress, ProgressCallback, RichProgress
 from clvol.result import Result
 from clvol.scene.records import Scene
@@ -117,26 +116,34 @@ def render(
     session = Session.for_scene(opened, scene, choices, seed, pool)
     session.describe()
     session.warn_of_unused(asked)
-    with bar as callback, _interrupt_flag() as interrupted:
-        if target_error is None:
-            done = session.run(first, count, time_limit, callback, interrupted)
-        else:
-            done = TargetRender(session, target_error, spp).run(time_limit, callback, interrupted)
-    result = session.result(first, done)
-    result.stats["interrupted"] = bool(interrupted())
+    with interruptible() as interrupt:
+        with bar as callback:
+            interrupt.heed(patience=1)
+            if target_error is None:
+                done = session.run(first, count, time_limit, callback, interrupt.asked)
+            else:
+                done = TargetRender(session, target_error, spp).run(time_limit, callback, interrupt.asked)
+            interrupt.keep()
+        result = session.result(first, done)
+        result.stats["interrupted"] = interrupt.asked()
     if target_error is not None:
         result.metadata["target_error"] = target_error
     if piloted:
-        from clvol.measure.repeat import repeat_command
-
         if target_error is not None:
             extent = {"spp": spp, "time": time_limit}
         else:  # a time limit is repeated by the samples it was enough for
             extent = {"samples": f"{first},{done}"} if first else {"spp": done}
-        repeat = repeat_command(scene, found.options, given | extent | {"seed": seed, "device": device})
-        log.info("repeat with: %s", repeat)
-        result.metadata |= {"pilot": found.options, "pilot_reason": found.reason, "repeat": repeat}
+        _say_how_to_repeat(result, scene, found, given | extent | {"seed": seed, "device": device})
     return result
+
+
+def _say_how_to_repeat(result: Result, scene: Scene, found: Found, options: dict[str, Any]) -> None:
+    """What the pilot chose, and the command that renders the same without it."""
+    from clvol.measure.repeat import repeat_command
+
+    repeat = repeat_command(scene, found.options, options)
+    log.info("repeat with: %s", repeat)
+    result.metadata |= {"pilot": found.options, "pilot_reason": found.reason, "repeat": repeat}
 
 
 def _piloted(
@@ -202,26 +209,3 @@ def _sample_range(
             hint=f"give at least 1 sample, and at most {MAX_SAMPLES} in all",
         )
     return first, count
-
-
-@contextmanager
-def _interrupt_flag() -> Iterator[Callable[[], bool]]:
-    """Turns the first Ctrl-C into a flag; the second one is an ordinary KeyboardInterrupt.
-
-    A process that ignores Ctrl-C, as the background jobs of a shell script do, goes on ignoring it.
-    """
-    flag = threading.Event()
-    previous = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or previous in (signal.SIG_IGN, None):
-        yield flag.is_set
-        return
-
-    def on_interrupt(number: int, frame: object) -> None:
-        flag.set()
-        signal.signal(signal.SIGINT, previous)
-
-    signal.signal(signal.SIGINT, on_interrupt)
-    try:
-        yield flag.is_set
-    finally:
-        signal.signal(signal.SIGINT, previous)

@@ -8,7 +8,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +15,7 @@ import numpy as np
 import pytest
 from OpenImageIO import ImageInput
 from pictures import ball, box, gridded, hg, homogeneous, picture, volume
+from signals import press_key
 from stat_tests import assert_same_picture
 
 import clvol
@@ -176,10 +176,7 @@ def interrupted_render(signals=1):
     def press(progress):
         while left[0]:
             left[0] -= 1
-            handler = signal.getsignal(signal.SIGINT)
-            signal.raise_signal(signal.SIGINT)
-            while left[0] and signal.getsignal(signal.SIGINT) is handler:
-                time.sleep(0.001)  # Python may put it off where other threads run, and two would merge
+            press_key(signal.SIGINT)
 
     return rendered(scene(), spp=50 * SPP, seed=7, progress=press)
 

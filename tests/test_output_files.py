@@ -37,7 +37,7 @@ def noise(size: int = 64) -> Result:
     """A picture that no compression makes small."""
     values = np.random.default_rng(1).random((size, size, 3))
     about = {"technique": "delta", "transmittance": "ratio", "majorant": "grid", "lookup": "exact"}
-    stats = {"paths": 96, "lookups": 192}
+    stats = {"paths": 96, "lookups": 192, "interrupted": False}
     return Result.from_estimate(
         Moments(2 * values, 3 * values**2, 2), (0, 2), {}, stats, about | {"seconds": 1.0}
     )

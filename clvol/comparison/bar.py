@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from clvol.progress import format_seconds
+from clvol.progress import error_console, format_seconds
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -16,10 +16,9 @@ class Bar:
     that is called with seconds done, seconds expected and what is being done."""
 
     def __init__(self, console: Console | None = None) -> None:
-        from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-        console = console or Console(stderr=True)
+        console = console or error_console()
         self._bar = Progress(
             TextColumn("{task.description}", markup=False),
             BarColumn(),

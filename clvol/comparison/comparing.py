@@ -19,6 +19,7 @@ from clvol.comparison.names import names_asked
 from clvol.comparison.reference import Reference, read_reference
 from clvol.device import Device, open_device
 from clvol.errors import OptionError
+from clvol.interrupts import interruptible
 from clvol.measure.efficiency import LEAST_ROUNDS
 from clvol.measure.trials import Trial
 from clvol.scene.digest import scene_digest
@@ -87,7 +88,8 @@ def compare(
     if given is None and all(len(names) == 1 for names in asked.values()):
         raise _nothing_to_compare([])
     opened = open_device(device)
-    with Bar() if progress is True else nullcontext(progress or _silent) as told:
+    bar = Bar() if progress is True else nullcontext(progress or _silent)
+    with interruptible(), bar as told:
         lineup = open_lineup(
             opened, scene, asked, step, lambda n, of: told(n, 0.0, f"kernels, {n + 1} of {of}")
         )
@@ -99,7 +101,7 @@ def compare(
         measured, truth, interrupted = measure(
             lineup, plan, given, lambda: Trial.open(opened, scene, Choices()), told
         )
-    figures = compute_figures(measured, truth, chosen)
+        figures = compute_figures(measured, truth, chosen)
     about = _about(scene, opened, plan, step, measured, truth)
     return Comparison(figures, chosen, truth, lineup.left_out, lineup.doubles, interrupted, about)
 

@@ -16,6 +16,7 @@ import numpy as np
 from clvol.comparison.combine import Lineup
 from clvol.comparison.reference import Reference
 from clvol.comparison.shorter import shorter_spp
+from clvol.interrupts import interruptible
 from clvol.measure.efficiency import LEAST_ROUNDS
 from clvol.measure.quiet import log_filter
 from clvol.measure.trials import Trial, rounds
@@ -178,17 +179,7 @@ def measure(
     if given is None:
         running.append(_reference_entrant(entrants, lineup, plan, spare, trial_seeds, clock))
     clock.expect({e.label: e.pace * e.spp for e in running}, plan.rounds)
-    done: list[list[_Render]] = []
-    interrupted = False
-    try:
-        for results in rounds(running, [e.spp for e in running], seeds):
-            done.append([_Render.of(result) for result in results])
-            if len(done) == plan.rounds:
-                break
-    except KeyboardInterrupt:
-        if len(done) < LEAST_ROUNDS:
-            raise
-        interrupted = True
+    done, interrupted = _rounds(running, plan.rounds, seeds)
     columns = list(zip(*done, strict=True))
     measured = [_measured(e, column) for e, column in zip(entrants, columns, strict=False)]
     for (entrant, spp, _), column in zip(shorter, columns[len(entrants) :], strict=False):
@@ -201,6 +192,25 @@ def measure(
         source = f"made with {seen}, seeds of its own"
         given = Reference.of_rounds(images, made.spp, source, (min(seeds_used), max(seeds_used)))
     return measured, given, interrupted
+
+
+def _rounds(running: list[_Entrant], count: int, seeds: Iterator[int]) -> tuple[list[list[_Render]], bool]:
+    """`count` rounds, or those that were complete at a Ctrl-C, and whether there was one."""
+    done: list[list[_Render]] = []
+    with interruptible() as interrupt:
+        try:
+            interrupt.heed(patience=0)
+            for results in rounds(running, [e.spp for e in running], seeds):
+                done.append([_Render.of(result) for result in results])
+                if len(done) == count:
+                    interrupt.keep()
+                    break
+        except KeyboardInterrupt:
+            if len(done) < LEAST_ROUNDS:
+                raise
+            interrupt.keep()
+            return done, True
+    return done, False
 
 
 def _samples(wanted: float, lineup: Lineup) -> int:
