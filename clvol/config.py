@@ -32,6 +32,7 @@ class KernelConfig:
     control: str = "mean"
     sampler: str = "independent"
     aov: tuple[str, ...] = ()
+    far_apart: bool = False  # channels' extinctions differ too much for one path (clvol.apart)
     pixel_list: bool = False  # runs are over listed pixels, each at a sample of its own
     local_size: int = 1
     group_slots: int = 256
@@ -52,8 +53,11 @@ class KernelConfig:
     def one_channel_per_path(self) -> bool:
         """A path follows one channel where channels are attenuated or absorbed differently and the technique
         cannot follow them together (METHODS §3, delta); a sample is then a path for each channel, which
-        spares the noise of choosing one.  Homogeneous media can be followed together."""
+        spares the noise of choosing one.  Homogeneous media can be followed together, but for channels that
+        are too far apart."""
         f = self.features
+        if self.far_apart and not self.tracker.all_channels:
+            return True
         if f.heterogeneous and not self.tracker.all_channels:
             return f.chromatic_extinction or (f.chromatic_albedo and self.absorption == "sample")
         return False

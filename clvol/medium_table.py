@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from clvol import layout
+from clvol.apart import peak_extinction
 from clvol.blackbody import blackbody_rgb
 from clvol.boundaries import MediumEntry, entry_bounds, is_clipped
 from clvol.features import bounding_kind, is_homogeneous
@@ -34,7 +35,8 @@ def medium_table(prepared: PreparedScene, volumes: dict[int, int], step: float |
     entries = prepared.boundaries.entries
     table = np.zeros(len(entries), layout.MEDIUM)
     cell_offset = kd_root = phase_first = 0
-    incident = mean_incident_radiance(prepared.scene) * (prepared.surfaces is None)
+    sky, suns = mean_incident_radiance(prepared.scene)
+    alone = prepared.surfaces is None
     boxes = entry_bounds(prepared.scene, prepared.boundaries)
     thin = thin_media(prepared.scene, prepared.boundaries)
     for record, entry, box, is_thin in zip(table, entries, boxes, thin, strict=True):
@@ -50,7 +52,8 @@ def medium_table(prepared: PreparedScene, volumes: dict[int, int], step: float |
         phase_first += record["phase_count"]
         record["sample_emitters"] = int(medium.sample_emitters)
         _emission(record, medium, volumes)
-        record["background"] = incident * expected_albedo(medium)
+        caught = -np.expm1(-most_depth(prepared, medium, box))  # a sun is seen in what scatters it alone
+        record["background"] = (sky + suns * caught) * expected_albedo(medium) * alone
         record["sigma_t_volume"] = volumes.get(id(medium.sigma_t), -1)
         record["albedo_volume"] = volumes.get(id(medium.albedo), -1)
         if isinstance(medium.albedo, records.ConstVolume):
@@ -100,23 +103,32 @@ def voxel_edges(volume: PreparedVolume) -> np.ndarray:
     return np.linalg.norm(np.linalg.inv(volume.world_to_index)[:3, :3], axis=0)
 
 
-def mean_incident_radiance(scene: records.Scene) -> np.ndarray:
-    """Mean over all directions of the radiance that arrives from infinity, float64 (3,); 0 where a limit of
-    depth keeps most of it from the picture."""
-    total = np.zeros(3)
+def mean_incident_radiance(scene: records.Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Mean over all directions of the radiance that arrives from infinity, of the sky and of suns, which no
+    ray meets, float64 (3,); 0 where a limit of depth keeps most of it from the picture."""
+    sky, suns = np.zeros(3), np.zeros(3)
     if 0 <= scene.integrator.max_depth < 3:
-        return total
+        return sky, suns
     for emitter in scene.emitters:
         match emitter:
             case records.ConstantEmitter():
-                total += _rgb(emitter.radiance)
+                sky += _rgb(emitter.radiance)
             case records.DirectionalEmitter():
-                total += _rgb(emitter.irradiance) / (4 * np.pi)
+                suns += _rgb(emitter.irradiance) / (4 * np.pi)
             case records.EnvmapEmitter():
                 rows = emitter.radiance.mean(axis=1, dtype=np.float64)
                 weights = np.sin(np.pi * np.arange(len(rows)) / max(len(rows) - 1, 1)) + 1e-9
-                total += np.average(rows, axis=0, weights=weights)
-    return total
+                sky += np.average(rows, axis=0, weights=weights)
+    return sky, suns
+
+
+def most_depth(
+    prepared: PreparedScene, medium: records.Medium, box: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """Bound of the optical depth across the medium's world box, float64 (3,); inf where it has no end."""
+    extinction = peak_extinction(prepared, medium)
+    length = np.linalg.norm(box[1] - box[0])
+    return np.multiply(extinction, length, where=extinction > 0, out=np.zeros(3))
 
 
 def expected_albedo(medium: records.Medium) -> np.ndarray:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clvol import registry
+from clvol.apart import extinction_ratio
 from clvol.estimate import Estimate
 from clvol.result import Result, said_ranges
 from clvol.scene.digest import scene_digest
@@ -61,6 +62,11 @@ def _metadata(session: Session, first: int, samples: np.ndarray) -> dict[str, An
         **session.choices(),
         **({"majorant_scale": needs.scale} if needs.scale != 1 else {}),
         **({"biased": ", ".join(biased), "step": session.step or "voxel"} if biased else {}),
+        **(
+            {"channels_apart": f"1 : {extinction_ratio(session.prepared):.3g}"}
+            if session.mixes_far_channels()
+            else {}
+        ),
         "spp": int(samples[0]) if even else round(float(samples.mean()), 3),
         **said_ranges(((first, int(samples.max())),)),
         "seed": session.seed,

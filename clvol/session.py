@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from clvol import layout, registry
+from clvol.apart import FAR_APART, extinction_ratio
 from clvol.arguments import check_seed
 from clvol.camera import camera_rays
 from clvol.choices import Choices, prepare_for, resolve
@@ -115,6 +116,14 @@ class Session:
             log.warning("majorant_scale is not used: nothing in this render walks a majorant")
         if not self.config.features.emitters and not self.config.features.emission:
             log.warning("the scene has no emitter: its picture is black")
+        if self.mixes_far_channels():
+            log.warning(
+                "extinctions of the channels differ by 1 : %.2g, and technique %s follows them with one path: "
+                "most of what the thinnest scatters may never be sampled, nor the error show it; technique auto "
+                "or delta has a path for each channel",
+                extinction_ratio(self.prepared),
+                self.config.technique,
+            )
         for what in self.biased():
             log.warning("%s is BIASED: the picture's mean is off by an unknown amount", what)
 
@@ -144,6 +153,10 @@ class Session:
         return [
             f"{f} {used[f]}" for f, table in families.items() if used[f] in table and table[used[f]].biased
         ]
+
+    def mixes_far_channels(self) -> bool:
+        """Whether one path follows channels whose extinctions are too far apart for it."""
+        return self.config.far_apart and self.config.extinction == 3
 
     def needs_bound(self) -> bool:
         """Whether a choice in force is right only where majorants bound the density."""
@@ -197,6 +210,7 @@ def kernel_config(prepared: PreparedScene, choices: Choices, device: Device) -> 
         prepared.features,
         majorant=prepared.majorant,
         aov=choices.aov,
+        far_apart=extinction_ratio(prepared) > FAR_APART,
         pixel_list=choices.target_error is not None,
         **resolved,
         **tuning,
