@@ -10,10 +10,10 @@ from clvol.scene import records
 
 FAR_APART = 1e4
 """Ratio of two channels' largest extinctions in a medium beyond which one path does not serve both.  Much of
-what the thin channel scatters lies deeper than the dense ones reach, where a path that follows all collides by
-chance only.  In a cube of optical depths 100, 50 and 100 r under a sun, six analytic renders of 2,048 samples
-fell short of the thin channel by 11, 20, 57 and 81 % at r = 1e-3, 1e-4, 1e-5 and 1e-6, and said 4, 12, 12 and
-3 %."""
+what the thin channel scatters lies deeper than the dense ones reach, where a path that follows all collides
+by chance only.  In a cube of optical depths 100, 50 and 100 r under a sun, six analytic renders of 2,048
+samples fell short of the thin channel by 11, 20, 57 and 81 % at r = 1e-3, 1e-4, 1e-5 and 1e-6, and said 4,
+12, 12 and 3 %."""
 
 
 def peak_extinction(prepared: PreparedScene, medium: records.Medium) -> np.ndarray:

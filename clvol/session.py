@@ -118,9 +118,9 @@ class Session:
             log.warning("the scene has no emitter: its picture is black")
         if self.mixes_far_channels():
             log.warning(
-                "extinctions of the channels differ by 1 : %.2g, and technique %s follows them with one path: "
-                "most of what the thinnest scatters may never be sampled, nor the error show it; technique auto "
-                "or delta has a path for each channel",
+                "extinctions of the channels differ by 1 : %.2g, and technique %s follows them with one "
+                "path: most of what the thinnest scatters may never be sampled, nor the error show it; "
+                "technique auto or delta has a path for each channel",
                 extinction_ratio(self.prepared),
                 self.config.technique,
             )
