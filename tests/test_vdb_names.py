@@ -63,6 +63,18 @@ def test_a_scene_takes_the_grid_it_names(caplog):
     assert not warnings_of(caplog)
 
 
+@pytest.mark.parametrize("plugin", ["vdbvolume", "gridvolume"])
+def test_a_grid_without_a_name_is_named_by_nothing(tmp_path, plugin):
+    names = ("density", "\x1e0")
+    tiles = [((0, 0, 0), 8, 1, True)]
+    write_vdb(tmp_path / "a.vdb", [GridSpec(name=n, tiles=tiles, background=len(n)) for n in names])
+    volume = {"type": plugin, "filename": str(tmp_path / "a.vdb"), "grid": ""}
+    medium = {"type": "heterogeneous", "sigma_t": volume}
+    cube = {"type": "cube", "bsdf": {"type": "null"}, "interior": medium}
+    scene = clvol.load_dict({"type": "scene", "camera": {"type": "perspective"}, "b": cube})
+    assert scene.shapes[0].interior.sigma_t.grid.background == 2
+
+
 def test_a_name_with_a_number_that_the_file_lacks_is_an_error_that_lists_the_names():
     for choice in ("density[2]", "density[", 2):
         with pytest.raises(VolumeError, match=r"has no grid .*its grids are 'density', 'density\[1\]'"):

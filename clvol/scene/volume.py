@@ -95,7 +95,9 @@ def _grid(reader: Reader) -> Grid:
         return dense_from_array(reader.array(sources[0]), source=reader.node.place(sources[0]))
     path = find_parameter(reader, "filename")
     grids = reader.build.grids
-    key = (path.resolve(), name or ("density" if path.suffix == ".vdb" else None))
+    if name is None and path.suffix.lower() == ".vdb":
+        name = "density"
+    key = (path.resolve(), name)
     if key not in grids:
         grids[key] = read_volume(path, key[1])
     return grids[key]
