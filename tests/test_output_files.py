@@ -20,7 +20,7 @@ from click.testing import CliRunner
 import clvol
 from clvol import image_io
 from clvol.cli import main
-from clvol.comparison.report import _replace
+from clvol.comparison.report import _replace, check_folder
 from clvol.errors import OptionError
 from clvol.estimate import Moments
 from clvol.output_files import check_file, write_file
@@ -255,6 +255,8 @@ def test_a_disk_without_room_is_refused_before_rendering(
     assert outcome.exit_code == 2 and "cannot write 4 KiB" in outcome.stderr
     with no_file_over(raw // 2):
         check_disk(tmp_path / "a.exr", 64 * 64, 0)
+        with pytest.raises(OptionError, match="cannot write 256 KiB"):
+            check_folder(tmp_path / "report")
     assert "no room for the 128 KiB it may take" in caplog.text
     assert not list(tmp_path.glob("*.exr"))
 

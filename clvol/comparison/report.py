@@ -40,6 +40,8 @@ from clvol.errors import OptionError
 from clvol.output_files import check_room, kept_elsewhere, new_file, real, sync_folder
 
 KIND = "clvol compare"
+_LEAST_BYTES = 2**18
+"""No report is smaller."""
 _JSON, _HTML, _REFERENCE = "report.json", "report.html", "reference.exr"
 
 
@@ -56,7 +58,7 @@ def check_folder(folder: str | os.PathLike[str]) -> None:
                 where=where,
                 hint="take another folder",
             )
-    check_room(target.parent, where)
+    check_room(target.parent, where, _LEAST_BYTES)
 
 
 def write_report(comparison: Comparison, folder: str | os.PathLike[str]) -> None:
