@@ -17,6 +17,7 @@ from clvol.errors import SceneError
 from clvol.features import Features, is_homogeneous, medium_volumes
 from clvol.scene import records
 from clvol.surfaces import Surfaces, prepare_surfaces
+from clvol.thinness import check_thinness
 from clvol.volumes.bricks import BOUND_CELLS, BrickMap, build_bricks
 from clvol.volumes.grid import DenseGrid
 
@@ -101,13 +102,14 @@ class PreparedScene:
 def prepare(scene: records.Scene, needs: MajorantNeeds | None = None) -> PreparedScene:
     """Build brick maps, majorants and what `needs` asks of them.
 
-    Raises SceneError where a coefficient is too large for a float, a volume is wrapped as none can be, or the
-    camera is not in the medium that it is said to be in.
+    Raises SceneError where a coefficient is too large for a float, a volume is wrapped as none can be, a
+    medium is too thin for places in it, or the camera is not in the medium that it is said to be in.
     """
     needs = needs or MajorantNeeds()
     features = Features.from_scene(scene)
     found = find_boundaries(scene)
     check_camera_medium(scene, found)
+    check_thinness(scene, found)
     centre, radius = scene_sphere(scene, found)
     volumes = {}
     for medium in (entry.medium for entry in found.entries):

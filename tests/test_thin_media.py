@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from pictures import assert_mean, ball, box, camera_rays, gridded, homogeneous, picture, volume
-from surface_scenes import SKY, SPECK, surfaced
+from surface_scenes import SKY, SPECK, mesh_box, surfaced
 
 import clvol
 from clvol.scene.materials import Diffuse
@@ -71,3 +71,44 @@ def test_a_thin_slab_scatters_like_a_thick_one(kind):
     assert 0.5 < images[0].mean() < 0.6
     furnace = clvol.render(view([slab(1e-8, kind, albedo=1.0)], True), spp=64, seed=2).image
     assert abs(furnace - 1).max() < 1e-5
+
+
+def shifted(shape, offset):
+    medium = shape.interior
+    if hasattr(medium.sigma_t, "index_to_world"):
+        to_world = clvol.translate(offset) @ medium.sigma_t.index_to_world
+        medium = replace(medium, sigma_t=replace(medium.sigma_t, index_to_world=to_world))
+    return replace(shape, interior=medium, to_world=clvol.translate(offset) @ shape.to_world)
+
+
+def opposite(offset):
+    return surfaced(ball(tuple(-x for x in offset), SPECK), Diffuse((0.0,)))
+
+
+@pytest.mark.parametrize("kind", ["homogeneous", "grid"])
+def test_places_in_a_thin_slab_are_refused_where_rounding_takes_them(kind):
+    """Far from the centre only: what scatters there would leave the slab by rounding alone."""
+    offset = (0.0, 0.0, 4.0)
+    thin, thick = (
+        picture([shifted(slab(h, kind, 0.5), offset), opposite(offset)], [SKY], (0, 0, 9), (0, 0, 0))
+        for h in (1e-6, 1e-3)
+    )
+    with pytest.raises(clvol.Error, match="too thin to scatter or vary"):
+        clvol.render(thin, spp=1)
+    clvol.render(thick, spp=1)
+
+
+def test_a_thin_uniform_slab_absorbs_anywhere():
+    offset = (0.0, 0.0, 4.0)
+    eye = np.add(EYE, offset)
+    shapes = [shifted(slab(1e-6, "homogeneous"), offset), opposite(offset)]
+    scene = picture(shapes, [SKY], eye, offset, 1e-4)
+    assert_mean(rendered(scene), np.exp(-slant(scene)))
+
+
+def test_a_thin_boundary_is_warned_of(caplog):
+    """A mesh is met where it is: entry and exit are rounded each."""
+    pane = mesh_box((-1, -1, 0), (1, 1, 1e-6), homogeneous(1.0))
+    scene = picture([replace(pane, name="pane")], [SKY], EYE, (0, 0, 0))
+    clvol.render(scene, spp=1)
+    assert "pane bounds a medium and is 2e-06 thick, too thin to be measured" in caplog.text
