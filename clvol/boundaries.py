@@ -163,15 +163,23 @@ def is_clipped(medium: records.Medium) -> bool:
     return not isinstance(medium.sigma_t, records.GridVolume) or medium.sigma_t.clipped
 
 
+def _holders(found: Boundaries) -> dict[int, list[Boundary]]:
+    """The boundaries that hold each medium, by the number of its entry."""
+    held: dict[int, list[Boundary]] = {number: [] for number in range(-1, len(found.entries))}
+    for boundary in found.boundaries:
+        held[boundary.interior].append(boundary)
+    return held
+
+
 def entry_bounds(scene: records.Scene, found: Boundaries) -> list[tuple[np.ndarray, np.ndarray]]:
     """World bounds of each medium: of the shape, or of all boundaries that hold it; infinite where it is
     everywhere."""
-    boxes = []
+    boxes, holders = [], _holders(found)
     for number, entry in enumerate(found.entries):
         if entry.everywhere:
             boxes.append((np.full(3, -np.inf), np.full(3, np.inf)))
             continue
-        held = [scene.shapes[b.shape] for b in found.boundaries if b.interior == number]
+        held = [scene.shapes[b.shape] for b in holders[number]]
         parts = [shape_bounds(s) for s in ([entry.shape] if entry.shape is not None else []) + held]
         lower, upper = zip(*parts, strict=True)
         boxes.append((np.min(lower, axis=0), np.max(upper, axis=0)))
@@ -193,24 +201,22 @@ def scene_sphere(scene: records.Scene, found: Boundaries) -> tuple[np.ndarray, f
 def may_overlap(scene: records.Scene, found: Boundaries) -> bool:
     """Conservative: whether two media may be present at one point, which they cannot where their bounds are
     apart, or where all that holds the one keeps out the other."""
-    boxes = entry_bounds(scene, found)
+    boxes = np.array(entry_bounds(scene, found)).reshape(-1, 2, 3)
+    lower, upper, holders = boxes[:, 0], boxes[:, 1], _holders(found)
     for a in range(len(boxes)):
-        for b in range(a):
-            apart = (boxes[a][0] >= boxes[b][1]).any() or (boxes[b][0] >= boxes[a][1]).any()
-            if not (apart or _replaces(found, a, b) or _replaces(found, b, a)):
+        meet = ((lower[a] < upper[:a]) & (lower[:a] < upper[a])).all(axis=1)
+        for b in np.flatnonzero(meet).tolist():
+            if not (_replaces(found, holders, a, b) or _replaces(found, holders, b, a)):
                 return True
     return False
 
 
-def _replaces(found: Boundaries, inner: int, outer: int) -> bool:
+def _replaces(found: Boundaries, holders: dict[int, list[Boundary]], inner: int, outer: int) -> bool:
     """Whether every boundary of `inner` has `outer` as its exterior, and outer is held once at any point."""
-    holds = [b for b in found.boundaries if b.interior == inner]
     entry = found.entries[outer]
-    held_once = entry.everywhere or (
-        entry.shape is not None or sum(b.interior == outer for b in found.boundaries) == 1
-    )
-    only = found.entries[inner].shape is None and bool(holds)
-    return only and held_once and all(b.exterior == outer for b in holds)
+    held_once = entry.everywhere or entry.shape is not None or len(holders[outer]) == 1
+    only = found.entries[inner].shape is None and bool(holders[inner])
+    return only and held_once and all(b.exterior == outer for b in holders[inner])
 
 
 def camera_may_be_inside(scene: records.Scene, found: Boundaries) -> bool:

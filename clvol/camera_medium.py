@@ -11,10 +11,9 @@ import logging
 
 import numpy as np
 
-from clvol.boundaries import Boundaries
+from clvol.boundaries import Boundaries, is_clipped
 from clvol.camera import camera_rays
 from clvol.errors import SceneError
-from clvol.features import is_clipped
 from clvol.scene import records
 from clvol.scene.primitives import canonical_mesh
 
