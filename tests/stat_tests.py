@@ -52,6 +52,28 @@ def largest_z(comparisons, alpha=FALSE_ALARM):
     return float(stats.norm.isf(sidak(alpha, comparisons) / 2))
 
 
+class TooNoisyError(AssertionError):
+    """An estimate may be right or wrong, its noise hides which: a failure with words of its own."""
+
+
+def require_precision(error, most, what):
+    """Raise TooNoisyError where a standard error is above what a test needs to see what it is to see."""
+    error, most = np.broadcast_arrays(np.asarray(error, float), most)
+    if not (error <= most).all():
+        raise TooNoisyError(f"{what}: too noisy to tell right from wrong: error {error}, {most} is needed")
+
+
+def require_samples(expected, weights, what, least=10.0):
+    """Raise TooNoisyError where a sum of `expected`, of these weights, may hang on too few, below `least`.
+
+    It is far from normal then, its variance unknown, and a deviation from it means nothing.
+    """
+    largest = float(np.abs(weights).max(initial=0.0))
+    if expected < least * largest:
+        sizes = f"weights of up to {largest:.3g} for a sum of {expected:.3g}"
+        raise TooNoisyError(f"{what}: too noisy to tell right from wrong: {sizes}")
+
+
 def tile_means(image, variance, tile):
     """Means and their variances over square tiles of a (h, w, c) image: (tiles, c) each."""
     h, w, c = image.shape

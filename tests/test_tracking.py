@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from fields import CHROMATIC, FIELDS, RAYS, exit_distance
 from probe import Probe, medium_of, scene_of
-from stat_tests import FALSE_ALARM, largest_z, sidak, z_score
+from stat_tests import FALSE_ALARM, largest_z, require_precision, sidak, z_score
 from walks import (
     BINS,
+    assert_weighted_collisions,
     collision_p_value,
     exact_depth,
     sample_walks,
     scene_with,
     transmittance_walks,
     unbiased,
-    weighted_z,
 )
 
 from clvol import registry
@@ -77,7 +77,7 @@ def test_collisions_follow_the_exact_distribution(probes, technique, majorant, l
         where = f"{field}, ray {name}"
         assert flaws.sum() == 0, where
         if weighted and tau[-1] > 0:
-            assert weighted_z(t, weights[:, 0], tau, length).max() < bound, where
+            assert_weighted_collisions(t, weights[:, 0], tau, length, bound, where)
         else:
             assert (weights == 1).all(), where
             assert collision_p_value(t, tau, length) > level, where
@@ -98,8 +98,9 @@ def test_collisions_of_each_channel_follow_its_distribution(probes, technique, m
                 walks = sample_walks(probe, ray, length, WALKS, channel=channel)
             t, weights, _, flaws, _ = walks
             assert flaws.sum() == 0
-            z = weighted_z(t, weights[:, channel if together else 0], tau[channel], length)
-            assert z.max() < bound, f"{field}, ray {name}, channel {channel}"
+            own = weights[:, channel if together else 0]
+            where = f"{field}, ray {name}, channel {channel}"
+            assert_weighted_collisions(t, own, tau[channel], length, bound, where)
 
 
 def assert_mean(values, exact, comparisons, where):
@@ -178,6 +179,7 @@ def test_density_is_right_to_half_a_percent(probes, technique, majorant, lookup)
         z_score(share.mean(), share.var() / walks, -np.expm1(-factor * tau)) for factor in (0.995, 1.0, 1.005)
     ]
     assert abs(deviations[1]) < bound
+    require_precision(share.std() / walks**0.5, 0.005 * share.mean() / bound, "half a percent")
     assert deviations[0] > bound and deviations[2] < -bound
 
 
@@ -193,6 +195,7 @@ def test_transmittance_is_right_to_half_a_percent(probes, transmittance, majoran
     z = [z_score(values.mean(), variance, f * exact) for f in (0.995, 1, 1.005)]
     bound = largest_z(1)
     assert abs(z[1]) < bound
+    require_precision(variance**0.5, 0.005 * exact / bound, "half a percent")
     assert z[0] > bound and z[2] < -bound
 
 
