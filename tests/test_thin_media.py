@@ -112,3 +112,10 @@ def test_a_thin_boundary_is_warned_of(caplog):
     scene = picture([replace(pane, name="pane")], [SKY], EYE, (0, 0, 0))
     clvol.render(scene, spp=1)
     assert "pane bounds a medium and is 2e-06 thick, too thin to be measured" in caplog.text
+
+
+def test_the_view_of_a_ray_knows_how_thin_a_slab_is():
+    scene = view([slab(1e-8, "homogeneous")], surfaces=False)
+    shown = clvol.trace_ray(scene, 2, 2, techniques=["delta"], transmittances=["ratio"])
+    assert shown.place.length == pytest.approx(1e-8 * slant(scene), rel=1e-5)
+    assert shown.depth[0, -1] == pytest.approx(slant(scene), rel=1e-4)

@@ -10,10 +10,11 @@ __kernel void places(CLVOL_ARGUMENTS, __global const float *given, __global floa
     ray.o = load_vector(given);
     ray.d = load_vector(given + 3);
     for (uint m = 0; m < media; ++m) {
-        float t0 = 0.0f, t1 = INFINITY;
-        medium_interval(scene.media + m, ray, &t0, &t1);
-        intervals[2 * m] = t0;
-        intervals[2 * m + 1] = t1;
+        Span span;
+        medium_span(scene.media + m, ray, 0.0f, INFINITY, &span);
+        intervals[3 * m] = span.base;
+        intervals[3 * m + 1] = span.start;
+        intervals[3 * m + 2] = span.end;
     }
 #if CLVOL_HAS_SURFACES
     Hit hit = {0.0f, 0.0f, 0.0f, NO_PRIMITIVE};

@@ -51,17 +51,18 @@ class RayKernels:
         return cls(device, choices, prepared, config, buffers)
 
     def places(self, origin: np.ndarray, direction: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
-        """Surfaces on a ray, float32 (n, 3): t, number, entering; and each medium's interval, (media, 2)."""
+        """Surfaces on a ray, float32 (n, 3): t, number, entering; and each medium's interval, float64
+        (media, 2): single precision would round the length of a thin one away."""
         features = self.config.features
         media = len(self.prepared.boundaries.entries)
-        hits, intervals = np.full((most, 3), np.inf, np.float32), np.empty((media, 2), np.float32)
+        hits, intervals = np.full((most, 3), np.inf, np.float32), np.empty((media, 3), np.float32)
         headers = ["geometry/interval.h"] if media else []
         headers += ["geometry/bvh.h", "geometry/surface.h"] if features.surfaces else []
         if media:
             given = np.concatenate([origin, direction]).astype(np.float32)
             sizes = np.uint32(media), np.uint32(most)
             self._run(1, "places", headers, "", [given], [hits, intervals], sizes)
-        return hits[np.isfinite(hits[:, 0])], intervals
+        return hits[np.isfinite(hits[:, 0])], intervals[:, :1].astype(float) + intervals[:, 1:]
 
     def tables(
         self, given: np.ndarray, family: str | None, points: int
