@@ -196,3 +196,22 @@ def test_a_scene_that_names_pipes_is_refused(tmp_path):
     ):
         with pytest.raises(Error, match="is a named pipe, not a file"):
             clvol.load_dict({"type": "scene", "camera": {"type": "perspective"}, "item": item})
+
+
+GLTF = """{"asset": {"version": "2.0"}, "buffers": [{"uri": "points.bin", "byteLength": 36}],
+"bufferViews": [{"buffer": 0, "byteLength": 36}],
+"accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+"meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+"nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}], "scene": 0}"""
+
+
+def test_a_gltf_that_names_a_pipe_is_refused_and_one_that_names_a_file_read(tmp_path):
+    path, points = tmp_path / "a.gltf", tmp_path / "points.bin"
+    path.write_text(GLTF)
+    scene = {"type": "scene", "camera": {"type": "perspective"}, "m": {"type": "gltf", "filename": str(path)}}
+    points.write_bytes(np.eye(3, dtype=np.float32).tobytes())
+    assert len(clvol.load_dict(scene).shapes[0].mesh.faces) == 1
+    points.unlink()
+    os.mkfifo(points)
+    with pytest.raises(Error, match=r"'points\.bin', which it names, is a named pipe, not a file"):
+        clvol.load_dict(scene)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from clvol.files import other_kind
 from clvol.scene.mesh import RawMesh, build_mesh
 from clvol.scene.obj import read_obj
 from clvol.scene.ply import read_mixed_ply
@@ -58,7 +59,7 @@ def _read_with_trimesh(path: Path, kind: str) -> RawMesh:
 
     with np.errstate(all="ignore"):
         # trimesh's repair of texture coordinates renumbers a ply's vertices, but not its normals
-        options = {"fix_texture": False} if kind == "ply" else {}
+        options = {"fix_texture": False} if kind == "ply" else {"resolver": _regular_files(path)}
         loaded = trimesh.load(str(path), file_type=kind, process=False, maintain_order=True, **options)
     if isinstance(loaded, trimesh.Trimesh):
         return _raw(loaded, np.eye(4))
@@ -69,6 +70,20 @@ def _read_with_trimesh(path: Path, kind: str) -> RawMesh:
             if isinstance(loaded.geometry[name], trimesh.Trimesh):
                 parts.append(_raw(loaded.geometry[name], np.asarray(to_world, np.float64)))
     return _joined(parts)
+
+
+def _regular_files(path: Path) -> object:
+    """Finds the files that a mesh names, in its folder as trimesh does, and waits for no pipe among them."""
+    from trimesh.resolvers import FilePathResolver
+
+    class RegularFiles(FilePathResolver):
+        def get(self, name: str) -> bytes:
+            for part in (name.strip(), name.strip().lstrip("/"), Path(name).name):
+                if kind := other_kind(Path(self.parent, part)):
+                    raise ValueError(f"'{part}', which it names, is {kind}, not a file")
+            return super().get(name)
+
+    return RegularFiles(str(path))
 
 
 def _raw(mesh: object, to_world: np.ndarray) -> RawMesh:
