@@ -21,7 +21,7 @@ def peak_extinction(prepared: PreparedScene, medium: records.Medium) -> np.ndarr
     if is_homogeneous(medium):
         densest = np.asarray(medium.sigma_t.value, np.float64)
     else:
-        densest = prepared.volumes[id(medium.sigma_t)].bricks.maximum.max(axis=(0, 1, 2)).astype(np.float64)
+        densest = prepared.volumes[id(medium.sigma_t)].bricks.peak.astype(np.float64)
     return np.broadcast_to(densest, 3) * np.broadcast_to(np.asarray(medium.scale, np.float64), 3)
 
 

@@ -33,6 +33,8 @@ class KernelConfig:
     sampler: str = "independent"
     aov: tuple[str, ...] = ()
     far_apart: bool = False  # channels' extinctions differ too much for one path (clvol.apart)
+    top_trees: bool = False  # some volume's top grid is a tree
+    tree_grid: bool = False  # the majorant is a grid whose cells are found through a tree
     pixel_list: bool = False  # runs are over listed pixels, each at a sample of its own
     local_size: int = 1
     group_slots: int = 256
@@ -160,6 +162,7 @@ class KernelConfig:
             "CLVOL_HAS_SPHERE": int(f.spheres),
             "CLVOL_HAS_TRILINEAR": int(f.trilinear),
             "CLVOL_HAS_NEAREST": int(f.nearest),
+            "CLVOL_HAS_TOP_TREES": int(self.top_trees),
             "CLVOL_HAS_COLOURED_VOLUME": int(f.coloured_volumes),
             "CLVOL_HAS_ALBEDO_VOLUME": int(f.albedo_volumes),
             "CLVOL_DENSITY_CHANNELS": 3 if f.coloured_extinction else 1,

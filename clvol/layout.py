@@ -33,6 +33,7 @@ VOLUME = _record(
     ("top_offset", "i", 1),  # first entry in `tops`
     ("brick_offset", "u", 1),  # first brick in `bricks`, in units of 729 floats
     ("nearest", "i", 1),  # 1: nearest sample, 0: trilinear
+    ("levels", "i", 1),  # the top grid is a tree of so many levels; 0: an array
 )
 
 MEDIUM = _record(
@@ -65,6 +66,8 @@ MEDIUM = _record(
     ("cell_offset", "i", 1),  # first row in `majorants`, `controls` and `residuals`
     ("cell_size", "f", 1),  # edge of a majorant cell in index units
     ("kd_root", "i", 1),  # first entry in `kd_nodes`
+    ("links_first", "i", 1),  # first entry in `majorant_links`
+    ("links_levels", "i", 1),  # and levels of that tree
 )
 
 PHASE = _record(
@@ -393,6 +396,7 @@ def arguments(config: KernelConfig) -> list[Argument]:
         Argument("tops", "__global const int *", features.volumes > 0),
         Argument("bricks", "__global const float *", features.volumes > 0),
         Argument("majorants", "__global const float *", config.walks_majorants and config.majorant == "grid"),
+        Argument("majorant_links", "__global const int *", config.walks_majorants and config.tree_grid),
         Argument(
             "kd_nodes", "__global const uint2 *", config.walks_majorants and config.majorant == "kdtree"
         ),

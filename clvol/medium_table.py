@@ -34,7 +34,7 @@ def medium_table(prepared: PreparedScene, volumes: dict[int, int], step: float |
     """
     entries = prepared.boundaries.entries
     table = np.zeros(len(entries), layout.MEDIUM)
-    cell_offset = kd_root = phase_first = 0
+    cell_offset = kd_root = links_first = phase_first = 0
     sky, suns = mean_incident_radiance(prepared.scene)
     alone = prepared.surfaces is None
     boxes = entry_bounds(prepared.scene, prepared.boundaries)
@@ -75,7 +75,9 @@ def medium_table(prepared: PreparedScene, volumes: dict[int, int], step: float |
         record["majorant"] = majorant.majorant.max()
         record["cells"], record["cell_size"] = majorant.cells, majorant.cell_size
         record["cell_offset"], record["kd_root"] = cell_offset, kd_root
+        record["links_first"], record["links_levels"] = links_first, majorant.levels
         cell_offset += len(majorant.majorant)
+        links_first += 0 if majorant.links is None else majorant.links.size
         kd_root += 0 if majorant.nodes is None else len(majorant.nodes)
     return table
 

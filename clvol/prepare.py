@@ -10,7 +10,10 @@ import numpy as np
 
 from clvol.accel import choice, controls
 from clvol.accel.bounds import Bounds, with_slack
-from clvol.accel.kdtree import KdTree, build_kdtree, pack_maximum, tree_lattice, unpack_maximum
+from clvol.accel.kdtree import KdTree, pack_maximum, unpack_maximum
+from clvol.accel.sparse_bounds import SparseBounds, from_dense, sparse_bounds
+from clvol.accel.sparse_grid import tree_grid
+from clvol.accel.sparse_kdtree import build_tree, finest_lattice
 from clvol.boundaries import Boundaries, find_boundaries, is_clipped, scene_sphere
 from clvol.camera_medium import check_camera_medium
 from clvol.errors import SceneError
@@ -18,7 +21,7 @@ from clvol.features import Features, is_homogeneous, medium_volumes
 from clvol.scene import records
 from clvol.surfaces import Surfaces, prepare_surfaces
 from clvol.thinness import check_thinness
-from clvol.volumes.bricks import BOUND_CELLS, BrickMap, build_bricks
+from clvol.volumes.bricks import BOUND_CELLS, BrickMap, BrickTree, build_bricks
 from clvol.volumes.grid import DenseGrid
 
 log = logging.getLogger("clvol")
@@ -32,7 +35,7 @@ class PreparedVolume:
     """A grid volume as bricks, with the map from the scene's centred world to brick index space."""
 
     volume: records.GridVolume
-    bricks: BrickMap
+    bricks: BrickMap | BrickTree
     world_to_index: np.ndarray
 
 
@@ -61,10 +64,12 @@ class MajorantNeeds:
 class PreparedMajorant:
     """The cells of one medium's majorant, in the units of its sigma_t volume.
 
-    A row is the whole medium for `global`, a cell in C order [z, y, x] for `grid`, and a leaf for `kdtree`.
+    A row is the whole medium for `global`, a cell in C order [z, y, x] for `grid` (in the order of
+    clvol.accel.sparse_grid where a volume of the scene is large and mostly empty), and a leaf for `kdtree`.
 
     cells, cell_size : the lattice it is walked on, x y z, and a cell's edge in index units.
     nodes : uint32 (m, 2), the kd-tree, its bounds as in `majorant`; else None.
+    links, levels : int32 (m, 512) and its levels, the tree that a sparse grid's cells are found through.
     majorant : float32 (n,), bound of all channels, times `MajorantNeeds.scale`.
     control : float32 (n, channels), what decomposition subtracts; None where nothing is.
     residual : float32 (n, channels + 1), control and majorant of residual ratio tracking; None where unused.
@@ -76,6 +81,8 @@ class PreparedMajorant:
     majorant: np.ndarray
     control: np.ndarray | None
     residual: np.ndarray | None
+    links: np.ndarray | None = None
+    levels: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,10 +168,13 @@ def _box(volume: records.GridVolume) -> np.ndarray:
     return np.array([[*volume.lower, 1.0], [*volume.upper, 1.0]]).T
 
 
+AnyBounds = Bounds | SparseBounds
+
+
 class _Candidate(NamedTuple):
     """One medium's majorant of one kind: the lattice it is walked on, its tree, its expected cost."""
 
-    bounds: Bounds
+    bounds: AnyBounds
     tree: KdTree | None
     cost: float
 
@@ -189,6 +199,9 @@ def _choose_majorants(
         least = costs[chosen] or 1.0
         relative = ", ".join(f"{name} {cost / least:.2f}" for name, cost in costs.items())
         log.info("majorant %s: expected cost per ray relative to it: %s", chosen, relative)
+    if chosen == "grid" and any(isinstance(c.bounds, SparseBounds) for c in found[chosen]):
+        # all media are walked by the same code
+        found[chosen] = [c._replace(bounds=_as_sparse(c.bounds)) for c in found[chosen]]
     return chosen, {
         id(m): _tables(c, chosen, needs, _longest(m, volumes[id(m.sigma_t)]))
         for m, c in zip(media, found[chosen], strict=True)
@@ -206,7 +219,7 @@ def _longest(medium: records.Medium, volume: PreparedVolume) -> np.ndarray:
 
 def _check_range(medium: records.Medium, volume: PreparedVolume, needs: MajorantNeeds) -> None:
     scale = float(np.max(medium.scale))
-    largest = float(volume.bricks.maximum.max())
+    largest = float(volume.bricks.peak.max())
     if largest * max(scale, 1.0) * max(needs.scale, 1.0) > float(np.finfo(np.float32).max):
         factor = "" if needs.scale == 1 else f" and majorant_scale {needs.scale:g}"
         raise SceneError(
@@ -215,21 +228,27 @@ def _check_range(medium: records.Medium, volume: PreparedVolume, needs: Majorant
         )
 
 
-def _bounds(volume: PreparedVolume, needs: MajorantNeeds) -> Bounds:
+def _bounds(volume: PreparedVolume, needs: MajorantNeeds) -> AnyBounds:
     """Bounds over the finest cells there are, with means where they are wanted."""
     bricks = volume.bricks
+    if isinstance(bricks, BrickTree):
+        return sparse_bounds(bricks, needs.means)
     return with_slack(bricks.minimum, bricks.maximum, BOUND_CELLS, bricks.means() if needs.means else None)
 
 
+def _as_sparse(bounds: AnyBounds) -> SparseBounds:
+    return bounds if isinstance(bounds, SparseBounds) else from_dense(bounds)
+
+
 def _candidate(
-    medium: records.Medium, volume: PreparedVolume, bounds: Bounds, kind: str, needs: MajorantNeeds
+    medium: records.Medium, volume: PreparedVolume, bounds: AnyBounds, kind: str, needs: MajorantNeeds
 ) -> _Candidate:
     extent = np.linalg.norm(np.linalg.inv(volume.world_to_index)[:3, :3], axis=0)
     rate, technique = float(np.max(medium.scale)), (needs.control, needs.scale)
     if kind == "kdtree":
-        bounds = tree_lattice(bounds)
+        bounds = finest_lattice(bounds)
         visits = choice.LEAF_COST, choice.STEP_COST
-        tree = build_kdtree(bounds, extent * bounds.cell_size, rate, *visits, *technique)
+        tree = build_tree(bounds, extent * bounds.cell_size, rate, *visits, *technique)
         return _Candidate(bounds, tree, tree.cost)
     if kind == "grid":
         bounds, cost = choice.best_grid(bounds, extent * bounds.cell_size, rate, *technique)
@@ -241,6 +260,9 @@ def _tables(candidate: _Candidate, kind: str, needs: MajorantNeeds, longest: np.
     """What the device reads of a majorant's cells, row by row; `longest` limits controls."""
     bounds, tree, _ = candidate
     found = tree or (bounds.whole() if kind == "global" else bounds)
+    links, levels = None, 0
+    if isinstance(found, SparseBounds):
+        links, levels, found = tree_grid(found)
     channels = found.maximum.shape[-1]
     extrema = [
         None if values is None else values.reshape(-1, channels)
@@ -256,4 +278,5 @@ def _tables(candidate: _Candidate, kind: str, needs: MajorantNeeds, longest: np.
         chosen, residual_majorant = controls.residual(*extrema, needs.residual, needs.scale, longest)
         residual = np.column_stack([chosen, residual_majorant])
     nodes = tree.nodes if tree else None
-    return PreparedMajorant(bounds.cells, bounds.cell_size, nodes, majorant, control, residual)
+    lattice = bounds.cells, bounds.cell_size
+    return PreparedMajorant(*lattice, nodes, majorant, control, residual, links, levels)

@@ -72,7 +72,7 @@ def stage_headers(config: KernelConfig, stage: str) -> list[str]:
     if walks and features.heterogeneous:
         chosen = config.tracker if stage == "medium_sample" else registry.TRANSMITTANCES[config.transmittance]
         if chosen.walks_majorant:
-            headers.append(registry.MAJORANTS[config.majorant].header)
+            headers.append(majorant_header(config))
         headers.append(chosen.header)
         if emits:
             headers.append("tracking/thin_emission.h")
@@ -93,6 +93,11 @@ def stage_headers(config: KernelConfig, stage: str) -> list[str]:
             headers.append("emitter/envmap.h")
         headers.append("emitter/emitter.h")
     return headers + geometry_headers(config, stage)
+
+
+def majorant_header(config: KernelConfig) -> str:
+    """The header of the majorant's walk."""
+    return "majorant/tree_grid.h" if config.tree_grid else registry.MAJORANTS[config.majorant].header
 
 
 def geometry_headers(config: KernelConfig, stage: str) -> list[str]:
@@ -150,7 +155,9 @@ def compose(config: KernelConfig, headers: list[str], body: str) -> str:
     for name in ("core/types.h", "core/random.h"):
         lines += _expand(name, seen)
     lines += ['#line 1 "layout"', *layout.layout_text(config).splitlines()]
-    for name in (registry.SAMPLERS[config.sampler].header, *headers):
+    reads = config.top_trees and any(name.startswith("density/") for name in headers)
+    trees = ["geometry/lattice_tree.h"] if reads else []
+    for name in (registry.SAMPLERS[config.sampler].header, *trees, *headers):
         lines += _expand(name, seen)
     for line in body.splitlines():
         match = _INCLUDE.match(line)

@@ -209,6 +209,8 @@ def kernel_config(prepared: PreparedScene, choices: Choices, device: Device) -> 
     return KernelConfig(
         prepared.features,
         majorant=prepared.majorant,
+        top_trees=any(volume.bricks.levels for volume in prepared.volumes.values()),
+        tree_grid=any(found.links is not None for found in prepared.majorants.values()),
         aov=choices.aov,
         far_apart=extinction_ratio(prepared) > FAR_APART,
         pixel_list=choices.target_error is not None,

@@ -45,6 +45,8 @@ def upload_scene(
     majorants = [prepared.majorants[id(e.medium)] for e in entries if id(e.medium) in prepared.majorants]
     if "majorants" in needed:
         buffers["majorants"] = _buffer(device, np.concatenate([m.majorant for m in majorants]))
+    if "majorant_links" in needed:
+        buffers["majorant_links"] = _buffer(device, np.concatenate([m.links for m in majorants]))
     if "kd_nodes" in needed:
         buffers["kd_nodes"] = _buffer(device, np.concatenate([m.nodes for m in majorants]))
     if "controls" in needed:
@@ -117,11 +119,12 @@ def _volume_buffers(device: Device, prepared: PreparedScene) -> dict[str, cl.Buf
         bricks = volume.bricks
         record["world_to_index"] = rows_3x4(volume.world_to_index)
         record["size"], record["channels"] = bricks.size, bricks.channels
-        record["bricks"] = bricks.top.shape[::-1]
+        record["bricks"], record["levels"] = bricks.shape[::-1], bricks.levels
         record["top_offset"], record["brick_offset"] = top_offset, brick_offset
         record["nearest"] = int(volume.volume.filter_type == "nearest")
         # numbers count bricks of `channels` × 729 floats; in the pool all count in 729 floats
-        tops.append(bricks.top.reshape(-1) * np.int32(bricks.channels))
+        top = bricks.top.reshape(-1)
+        tops.append(np.where(top > 0, top * np.int32(bricks.channels), top))
         top_offset += bricks.top.size
         brick_offset += bricks.brick_count * bricks.channels
     pool = device.memory.allocate(

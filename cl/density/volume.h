@@ -1,8 +1,8 @@
 /* The one way to read a sampled field: brick map look-up at a point of index space.
 
    Bricks hold 8³ cells and therefore 9³ samples each, so that the eight corners of a cell always
-   stand in one brick; the top grid maps a brick's place to its number.  Points beyond the lattice
-   take the value at its border. */
+   stand in one brick; the top grid maps a brick's place to its number: an array, or a tree where the volume
+   is large and mostly empty.  Points beyond the lattice take the value at its border. */
 #ifndef CLVOL_DENSITY_VOLUME_H
 #define CLVOL_DENSITY_VOLUME_H
 
@@ -15,6 +15,17 @@ typedef struct {
     float fx, fy, fz;
 } VolumeCell;
 
+/* Number of the brick at a place, in bricks. */
+INLINE uint volume_brick(const Scene *scene, __global const Volume *volume, int x, int y, int z)
+{
+#if CLVOL_HAS_TOP_TREES
+    int shift;
+    if (volume->levels > 0)
+        return (uint)tree_find(scene->tops + volume->top_offset, volume->levels, x, y, z, &shift);
+#endif
+    return (uint)scene->tops[volume->top_offset + (z * volume->bricks[1] + y) * volume->bricks[0] + x];
+}
+
 INLINE VolumeCell volume_cell(const Scene *scene, __global const Volume *volume, float3 p)
 {
     const float x = clamp_to(p.x, 0.0f, (float)(volume->size[0] - 1));
@@ -23,8 +34,7 @@ INLINE VolumeCell volume_cell(const Scene *scene, __global const Volume *volume,
     const int ix = min_int((int)x, volume->size[0] - 2);
     const int iy = min_int((int)y, volume->size[1] - 2);
     const int iz = min_int((int)z, volume->size[2] - 2);
-    const int top = ((iz >> 3) * volume->bricks[1] + (iy >> 3)) * volume->bricks[0] + (ix >> 3);
-    const uint brick = (uint)scene->tops[volume->top_offset + top];
+    const uint brick = volume_brick(scene, volume, ix >> 3, iy >> 3, iz >> 3);
     VolumeCell cell;
     cell.stride = CLVOL_HAS_COLOURED_VOLUME ? volume->channels : 1;
     cell.corner = scene->bricks + (size_t)(volume->brick_offset + brick) * BRICK_SAMPLES +

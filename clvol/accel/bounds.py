@@ -6,13 +6,16 @@ cell, and, by the slack below, for look-ups that rounding puts just outside it.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import reduce
 
 import numpy as np
 
 SLACK = np.float32(2.0**-10)
-"""A float position on a ray may lie this fraction of a voxel beyond the cell it was computed for."""
+"""A float position on a ray may lie this fraction of a voxel beyond the cell it was computed for, in lattices
+of up to SLACK_SIZE voxels an axis; the fraction grows with their size."""
+SLACK_SIZE = 4096
 _ROUNDING = np.float32(1 + 2.0**-20)
 """Interpolation rounds: its result may exceed its largest input by a few units in the last place."""
 
@@ -39,6 +42,10 @@ class Bounds:
     def majorant(self) -> np.ndarray:
         """The one bound that all channels share, (nz, ny, nx)."""
         return over_channels(self.maximum, np.maximum)
+
+    def groups(self) -> Iterator[tuple[Bounds, list[float]]]:
+        """All cells, and their sides in cells of the lattice: all alike (cf. clvol.accel.sparse_bounds)."""
+        yield self, [1.0, 1.0, 1.0]
 
     def coarser(self) -> Bounds:
         """The same over cells of twice the edge; in a mean every cell that it merges counts the same."""
@@ -80,12 +87,20 @@ def with_slack(
     The field changes by at most (neighbour's extremum - own) over one voxel into the neighbour.
     A cell that is exactly 0 in every channel stays 0, so that empty space is skipped.
     """
-    high = maximum + SLACK * (_neighbourhood(maximum, np.maximum) - maximum)
-    low = minimum + SLACK * (_neighbourhood(minimum, np.minimum) - minimum)
+    around = _neighbourhood(minimum, np.minimum), _neighbourhood(maximum, np.maximum)
+    return Bounds(*slackened(minimum, maximum, *around, max(minimum.shape[:3]) * cell_size), cell_size, mean)
+
+
+def slackened(
+    minimum: np.ndarray, maximum: np.ndarray, least: np.ndarray, most: np.ndarray, size: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Extrema (..., channels) with slack; `least`, `most` are over neighbours too; `size`: in voxels."""
+    slack = SLACK * np.float32(max(1.0, size / SLACK_SIZE))
+    high = maximum + slack * (most - maximum)
+    low = minimum + slack * (least - minimum)
     holds_matter = over_channels(maximum, np.maximum)[..., None] > 0
     high = np.where(holds_matter, high * _ROUNDING, np.float32(0)).astype(np.float32)
-    low = np.maximum(low / _ROUNDING, np.float32(0)).astype(np.float32)
-    return Bounds(low, high, cell_size, mean)
+    return np.maximum(low / _ROUNDING, np.float32(0)).astype(np.float32), high
 
 
 def _neighbourhood(values: np.ndarray, combine: np.ufunc) -> np.ndarray:

@@ -12,6 +12,7 @@ import numpy as np
 
 from clvol.accel.bounds import Bounds
 from clvol.accel.controls import Control, looseness
+from clvol.accel.sparse_bounds import SparseBounds
 
 CELL_COST = 0.055
 """Crossing a grid cell, in look-ups: fitted to the seconds of camera rays through scenes/cloud.xml over
@@ -21,9 +22,11 @@ STEP_COST = 0.08
 """Visiting a kd-tree leaf, and one step towards it from the root: of the pairs tried there, the one whose
 tree was walked fastest."""
 
+AnyBounds = Bounds | SparseBounds
+
 
 def global_cost(
-    bounds: Bounds, extent: np.ndarray, rate: float, control: Control = "none", majorant_scale: float = 1.0
+    bounds: AnyBounds, extent: np.ndarray, rate: float, control: Control = "none", majorant_scale: float = 1.0
 ) -> float:
     """Expected cost of one bound for everything.
 
@@ -36,18 +39,28 @@ def global_cost(
 
 
 def grid_cost(
-    bounds: Bounds, extent: np.ndarray, rate: float, control: Control = "none", majorant_scale: float = 1.0
+    bounds: AnyBounds, extent: np.ndarray, rate: float, control: Control = "none", majorant_scale: float = 1.0
 ) -> float:
     """Expected cost of a grid: its look-ups, and half the surface of every cell (each face is shared)."""
-    loose = looseness(bounds, control, majorant_scale)
-    a, b, c = extent
-    crossings = loose.size * 0.5 * (a * b + b * c + c * a)
-    return float(np.prod(extent)) * rate * float(loose.sum(dtype=np.float64)) + CELL_COST * crossings
+    total = 0.0
+    for cells, sides in bounds.groups():
+        loose = looseness(cells, control, majorant_scale)
+        a, b, c = (side * length for side, length in zip(sides, extent, strict=True))
+        volume, surface = a * b * c, 0.5 * (a * b + b * c + c * a)
+        surface = np.where(volume > 0, surface, 0.0)
+        total += rate * float(np.sum(volume * loose))
+        total += visit_cost(bounds) * float(np.broadcast_to(surface, loose.shape).sum())
+    return total
+
+
+def visit_cost(bounds: AnyBounds) -> float:
+    """Crossing a cell of a grid, in look-ups; those of a sparse one are found from a root."""
+    return CELL_COST if isinstance(bounds, Bounds) else LEAF_COST + STEP_COST * len(bounds.tiers)
 
 
 def best_grid(
-    bounds: Bounds, extent: np.ndarray, rate: float, control: Control = "none", majorant_scale: float = 1.0
-) -> tuple[Bounds, float]:
+    bounds: AnyBounds, extent: np.ndarray, rate: float, control: Control = "none", majorant_scale: float = 1.0
+) -> tuple[AnyBounds, float]:
     """The cheapest grid among `bounds` and its successive doublings, and its cost."""
     best, best_cost = bounds, grid_cost(bounds, extent, rate, control, majorant_scale)
     while max(bounds.cells) > 1:

@@ -10,20 +10,18 @@ technique's (clvol.accel.controls): the majorant, less the control that decompos
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from clvol.accel.bounds import Bounds
-from clvol.accel.controls import Control, looseness, scaled_majorant
+from clvol.accel.controls import Control, scaled_majorant
+from clvol.accel.kdtree_costs import DEEPER, LEAF, Boxes, Costs, Key, Level, weigh
 
 MOST_CELLS = 64
 """Cells per axis of the finest lattice: all boxes of a 64³ lattice number 2 million."""
-LEAF = -1
-
-Key = tuple[int, int, int]
-"""Halvings along z, y, x: level (a, b, c) has 2^a × 2^b × 2^c boxes."""
+LEAF_BITS = np.uint32(3)
+"""Low bits of a leaf's first word, which no inner node's has."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,33 +43,12 @@ class KdTree:
     depth: int
 
 
-@dataclass(frozen=True)
-class _Costs:
-    """What boxes cost: see `build_kdtree`."""
+class Grown(NamedTuple):
+    """Trees as nodes, uint32 (m, 2), the roots first, and the boxes of their leaves, in their order."""
 
-    rate: float
-    leaf: float
-    step: float
-    control: Control
-    majorant_scale: float
-
-
-class _Boxes(NamedTuple):
-    """Extrema and perhaps means of boxes, float32 (..., channels)."""
-
-    minimum: np.ndarray
-    maximum: np.ndarray
-    mean: np.ndarray | None
-
-
-@dataclass(frozen=True, eq=False)
-class _Level:
-    """All boxes of one size, and for each the cheapest cost, its leaf visits, its split: (2^a, 2^b, 2^c)."""
-
-    boxes: _Boxes
-    cost: np.ndarray
-    visits: np.ndarray
-    split: np.ndarray  # axis 0 = z, 1 = y, 2 = x, or LEAF
+    nodes: np.ndarray
+    leaves: Boxes
+    depth: int
 
 
 def tree_lattice(bounds: Bounds) -> Bounds:
@@ -100,74 +77,26 @@ def build_kdtree(
     control : what the technique subtracts; "fitted" needs `bounds.mean`.
     majorant_scale : multiplies the bounds, in the costs and in the nodes (extrema stay as they are).
     """
-    costs = _Costs(rate, leaf_cost, step_cost, control, majorant_scale)
+    costs = Costs(rate, leaf_cost, step_cost, control, majorant_scale)
     shape = bounds.maximum.shape[:3]
     depths: Key = tuple(int(n - 1).bit_length() for n in shape)
-    edges = [extent * np.arange(n + 1) for extent, n in zip(cell_extent[::-1], shape, strict=True)]
-    levels: dict[Key, _Level] = {}
-    for key in sorted(product(*(range(d + 1) for d in depths)), key=sum, reverse=True):
-        widths = [_widths(e, k, d) for e, k, d in zip(edges, key, depths, strict=True)]
-        halves = {
-            axis: levels[tuple(k + (a == axis) for a, k in enumerate(key))]
-            for axis in range(3)
-            if key[axis] < depths[axis]
-        }
-        if halves:
-            axis, level = next(iter(halves.items()))
-            boxes = _merged(level.boxes, axis, _widths(edges[axis], key[axis] + 1, depths[axis]))
-        else:
-            boxes = _padded(bounds, depths)
-        levels[key] = _cheapest(boxes, widths, halves, costs)
-    return _emit(levels, depths, majorant_scale)
+    edges = [
+        (extent * np.minimum(np.arange((1 << depth) + 1), n))[None]
+        for extent, n, depth in zip(cell_extent[::-1], shape, depths, strict=True)
+    ]
+    levels = weigh(_padded(bounds, depths), edges, depths, costs)
+    grown = grow(levels, depths, majorant_scale)
+    low, high, mean = grown.leaves
+    cost = float(levels[0, 0, 0].cost[0, 0, 0, 0])
+    return KdTree(grown.nodes, low, high, mean, cost, len(high), grown.depth)
 
 
-def _widths(edges: np.ndarray, halvings: int, depth: int) -> np.ndarray:
-    """World widths of the 2^halvings boxes along one axis; what reaches beyond the lattice counts as 0."""
-    planes = np.arange((1 << halvings) + 1) << (depth - halvings)
-    return np.diff(edges[np.minimum(planes, len(edges) - 1)])
-
-
-def _padded(bounds: Bounds, depths: Key) -> _Boxes:
-    """The lattice filled up to powers of two by cells that bound nothing."""
+def _padded(bounds: Bounds, depths: Key) -> Boxes:
+    """The lattice filled up to powers of two by cells that bound nothing; one of n."""
     pad = [(0, (1 << d) - n) for d, n in zip(depths, bounds.maximum.shape, strict=False)] + [(0, 0)]
-    mean = None if bounds.mean is None else np.pad(bounds.mean, pad)
-    return _Boxes(np.pad(bounds.minimum, pad, constant_values=np.inf), np.pad(bounds.maximum, pad), mean)
-
-
-def _pairs(values: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
-    """The first and the second of each two neighbours along an axis."""
-    even, odd = [slice(None)] * values.ndim, [slice(None)] * values.ndim
-    even[axis], odd[axis] = slice(0, None, 2), slice(1, None, 2)
-    return values[tuple(even)], values[tuple(odd)]
-
-
-def _merged(boxes: _Boxes, axis: int, widths: np.ndarray) -> _Boxes:
-    """Boxes of twice the length along an axis, where those of `boxes` have the given widths."""
-    low = np.minimum(*_pairs(boxes.minimum, axis))
-    high = np.maximum(*_pairs(boxes.maximum, axis))
-    if boxes.mean is None:
-        return _Boxes(low, high, None)
-    near, far = _pairs(boxes.mean, axis)
-    whole = widths[::2] + widths[1::2]
-    share = np.divide(widths[1::2], whole, out=np.zeros_like(whole), where=whole > 0).astype(np.float32)
-    # never beyond the two means, also after rounding: a constant box keeps its value
-    return _Boxes(low, high, near + (far - near) * share.reshape([-1 if a == axis else 1 for a in range(4)]))
-
-
-def _cheapest(boxes: _Boxes, widths: list[np.ndarray], halves: dict[int, _Level], costs: _Costs) -> _Level:
-    """Weigh a leaf against a split along each axis that can still be halved."""
-    w, h, d = widths[0][:, None, None], widths[1][None, :, None], widths[2][None, None, :]
-    visits = np.where(w * h * d > 0, 0.5 * (w * h + h * d + d * w), 0.0)
-    cost = w * h * d * costs.rate * looseness(boxes, costs.control, costs.majorant_scale)
-    cost += costs.leaf * visits
-    split = np.full(cost.shape, LEAF, np.int8)
-    for axis, level in halves.items():
-        below = np.add(*_pairs(level.visits, axis))
-        apart = np.add(*_pairs(level.cost, axis)) + costs.step * below
-        cheaper = apart < cost
-        cost, visits = np.where(cheaper, apart, cost), np.where(cheaper, below, visits)
-        split[cheaper] = axis
-    return _Level(boxes, cost, visits, split)
+    mean = None if bounds.mean is None else np.pad(bounds.mean, pad)[None]
+    low, high = np.pad(bounds.minimum, pad, constant_values=np.inf), np.pad(bounds.maximum, pad)
+    return Boxes(low[None], high[None], mean)
 
 
 def pack_maximum(high: np.ndarray) -> np.ndarray:
@@ -179,7 +108,7 @@ def pack_maximum(high: np.ndarray) -> np.ndarray:
     if not np.isfinite(high).all() or (high < 0).any():
         raise ValueError("majorants must be finite and not negative")
     bits = np.where(high > 0, high, np.float32(0)).view(np.uint32)
-    return np.where(high > 0, np.maximum(bits, np.uint32(4)), bits) | np.uint32(3)
+    return np.where(high > 0, np.maximum(bits, np.uint32(4)), bits) | LEAF_BITS
 
 
 def unpack_maximum(words: np.ndarray) -> np.ndarray:
@@ -188,38 +117,58 @@ def unpack_maximum(words: np.ndarray) -> np.ndarray:
     return np.where(words == 3, np.float32(0), words.view(np.float32))
 
 
-def _emit(levels: dict[Key, _Level], depths: Key, majorant_scale: float) -> KdTree:
-    """Nodes in breadth-first order, siblings side by side, and the leaves' rows, in the same order."""
-    keys, at = np.zeros((1, 3), np.int64), np.zeros((1, 3), np.int64)  # frontier: level and place, z y x
-    first, leaves, blocks, rows = 0, 0, [], []
+def grow(
+    levels: dict[Key, Level],
+    depths: Key,
+    majorant_scale: float,
+    origins: np.ndarray | None = None,
+    edge: int = 1,
+    roots: np.ndarray | None = None,
+    first: int = 0,
+    first_leaf: int = 0,
+) -> Grown:
+    """Nodes of the n trees, breadth first, siblings side by side, and the leaves' boxes, in the same order.
+
+    origins : int (n, 3), z y x of each lattice's first cell in finest cells; edge : of a cell, in those.
+    roots : uint32 (n, 2^a, 2^b, 2^c, 2), the root of each cell's own tree, where there is one.
+    first, first_leaf : numbers of the first node and leaf.
+    """
+    members = len(levels[0, 0, 0].cost)
+    origins = np.zeros((members, 3), np.int64) if origins is None else origins
+    keys, at = np.zeros((members, 3), np.int64), np.zeros((members, 3), np.int64)  # frontier: level, place
+    member = np.arange(members)
+    blocks, rows = [], []
     while len(at):
-        split, boxes = _frontier(levels, keys, at)
+        split, boxes = _frontier(levels, keys, at, member)
         node = np.empty((len(at), 2), np.uint32)
         first += len(at)
-        inner, leaf = split != LEAF, split == LEAF
+        inner, leaf, deeper = (split >= 0) & (split < DEEPER), split == LEAF, split == DEEPER
         rows.append([None if values is None else values[leaf] for values in boxes])
         node[leaf, 0] = pack_maximum(scaled_majorant(boxes.maximum[leaf], majorant_scale))
-        node[leaf, 1] = leaves + np.arange(np.count_nonzero(leaf))
-        leaves += int(np.count_nonzero(leaf))
-        axis = split[inner]
+        node[leaf, 1] = first_leaf + np.arange(np.count_nonzero(leaf))
+        if roots is not None:
+            node[deeper] = roots[(member[deeper], *at[deeper].T)]
+        first_leaf += int(np.count_nonzero(leaf))
+        axis, owner = split[inner], member[inner]
         pair = np.arange(len(axis))
         keys, at = np.repeat(keys[inner], 2, axis=0), np.repeat(at[inner], 2, axis=0)
+        member = np.repeat(owner, 2)
         for side in (0, 1):
             keys[2 * pair + side, axis] += 1
             at[2 * pair + side, axis] = 2 * at[2 * pair + side, axis] + side
         plane = at[1::2][pair, axis] << (np.array(depths)[axis] - keys[1::2][pair, axis])
+        plane = origins[owner, axis] + edge * plane
         node[inner, 0] = (plane.astype(np.uint32) << 2) | (2 - axis).astype(np.uint32)
         node[inner, 1] = first + 2 * pair.astype(np.uint32)
         blocks.append(node)
-    minimum, maximum, mean = (
-        None if part[0] is None else np.concatenate(part) for part in zip(*rows, strict=True)
-    )
-    cost = float(levels[0, 0, 0].cost[0, 0, 0])
-    return KdTree(np.concatenate(blocks), minimum, maximum, mean, cost, leaves, len(blocks))
+    leaves = Boxes(*(None if part[0] is None else np.concatenate(part) for part in zip(*rows, strict=True)))
+    return Grown(np.concatenate(blocks), leaves, len(blocks))
 
 
-def _frontier(levels: dict[Key, _Level], keys: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, _Boxes]:
-    """Splits of the boxes `at` of the levels `keys`, and those boxes, (n, channels)."""
+def _frontier(
+    levels: dict[Key, Level], keys: np.ndarray, at: np.ndarray, member: np.ndarray
+) -> tuple[np.ndarray, Boxes]:
+    """Splits of the boxes `at` of the levels `keys` of lattices `member`, and those boxes, (n, channels)."""
     boxes = levels[0, 0, 0].boxes
     split = np.empty(len(at), np.int64)
     minimum = np.empty((len(at), boxes.minimum.shape[-1]), np.float32)
@@ -227,11 +176,11 @@ def _frontier(levels: dict[Key, _Level], keys: np.ndarray, at: np.ndarray) -> tu
     mean = None if boxes.mean is None else np.empty_like(minimum)
     unique, group = np.unique(keys, axis=0, return_inverse=True)
     for number, key in enumerate(unique):
-        members = group.reshape(-1) == number
-        level, place = levels[tuple(int(k) for k in key)], tuple(at[members].T)
-        split[members] = level.split[place]
-        maximum[members] = level.boxes.maximum[place]
-        minimum[members] = np.minimum(level.boxes.minimum[place], maximum[members])  # inf beyond the lattice
+        of_key = group.reshape(-1) == number
+        level, place = levels[tuple(int(k) for k in key)], (member[of_key], *at[of_key].T)
+        split[of_key] = level.split[place]
+        maximum[of_key] = level.boxes.maximum[place]
+        minimum[of_key] = np.minimum(level.boxes.minimum[place], maximum[of_key])  # inf beyond the lattice
         if mean is not None:
-            mean[members] = level.boxes.mean[place]
-    return split, _Boxes(minimum, maximum, mean)
+            mean[of_key] = level.boxes.mean[place]
+    return split, Boxes(minimum, maximum, mean)

@@ -81,7 +81,7 @@ class RayKernels:
         sizes = [np.uint32(n) for n in (points, channels, MOST_CELLS)]
         text = "".join(f"#define {name}\n" for name, wanted in defines.items() if wanted)
         headers = [registry.LOOKUPS[self.config.lookup].header] if self.config.features.heterogeneous else []
-        headers += [registry.MAJORANTS[self.config.majorant].header] if walks else []
+        headers += [programs.majorant_header(self.config)] if walks else []
         headers += ["tracking/walk.h"] if headers else []
         self._run(points, "tables", headers, text, [given], [sigma, cells, count], sizes)
         return sigma, cells[: int(count[0])].copy() if walks else None

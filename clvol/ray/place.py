@@ -181,5 +181,5 @@ def pixel_hint(prepared: PreparedScene, x: int, y: int) -> str:
 def _is_empty(prepared: PreparedScene, medium: Medium) -> bool:
     """Whether its density is 0 everywhere."""
     volume = medium.sigma_t
-    largest = volume.value if isinstance(volume, ConstVolume) else prepared.volumes[id(volume)].bricks.maximum
+    largest = volume.value if isinstance(volume, ConstVolume) else prepared.volumes[id(volume)].bricks.peak
     return not np.any(largest) or not np.any(medium.scale)

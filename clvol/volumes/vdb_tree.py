@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NoReturn
 
 import numpy as np
 
+from clvol.volumes.brick_tree import MOST_EXTENT, PRUNE
 from clvol.volumes.files import allocate
 from clvol.volumes.vdb_stream import ACTIVE_MASK, VdbStream
 
@@ -18,8 +18,9 @@ INTERNAL_NODES = {128: 32, LEAF_EDGE: 16}
 LARGEST_INDEX = 1 << 24
 LEAF_BYTES = 4 * LEAF_VOXELS + LEAF_MASK_BYTES + 12
 TILE_BYTES = 12 + 4 + 4 + 1
-# The brick map keeps an index, a minimum and a maximum per 8³ brick of the box.
-BRICK_BYTES = 16
+# Bricks on a side of a root tile, or just beyond it, and what finding and bounding one takes.
+TILE_SIDE_BRICKS = 6 * (ROOT_CHILD_EDGE // LEAF_EDGE + 1) ** 2
+BRICK_BYTES = 128
 # Leaves decoded at once: large enough for NumPy, small enough to stay in the cache.
 BATCH = 512
 
@@ -164,9 +165,13 @@ class VdbTree:
         with np.errstate(over="ignore"):
             values = table["value"].astype(np.float32)
         kept = np.flatnonzero(table["active"] | (values != self.background))
-        bricks = kept.size * (ROOT_CHILD_EDGE // LEAF_EDGE) ** 3
+        bricks = kept.size * TILE_SIDE_BRICKS
         if bricks * BRICK_BYTES > self.max_bytes:
-            self.fail_extent(f"{kept.size} root tiles of {ROOT_CHILD_EDGE}³ samples", bricks)
+            self.stream.fail(
+                f"{kept.size} root tiles of {ROOT_CHILD_EDGE}³ samples have {bricks} bricks at their sides:"
+                f" more than the limit of {self.max_bytes} bytes can hold",
+                PRUNE,
+            )
         origins, seen = table["origin"][kept], set()
         for origin in origins.tolist():
             self.check_root_origin(tuple(origin), seen)
@@ -213,22 +218,18 @@ class VdbTree:
         return tuple(np.concatenate(column) for column in zip(none, *self._tiles, strict=True))
 
     def check_extent(self) -> None:
-        """Fail if the box around leaves and tiles is too large for the brick map to index."""
+        """Fail if leaves and tiles lie too far apart for the brick map to place them."""
         corners = np.concatenate([self.leaf_origins, self.tile_origins])
         if not len(corners):
             return
         ends = np.concatenate([self.leaf_origins + LEAF_EDGE, self.tile_origins + self.tile_sizes[:, None]])
         extent = [int(size) for size in ends.max(axis=0) - corners.min(axis=0)]
-        bricks = extent[0] * extent[1] * extent[2] // LEAF_VOXELS
-        if bricks * BRICK_BYTES > self.max_bytes:
-            self.fail_extent(f"leaves and tiles over {' x '.join(map(str, extent))} samples", bricks)
-
-    def fail_extent(self, what: str, bricks: int) -> NoReturn:
-        """Fail because `what` covers too many bricks."""
-        self.stream.fail(
-            f"{what} span {bricks} bricks of 8³: more than the limit of {self.max_bytes} bytes can index",
-            "the file is damaged, or has stray voxels far away: prune them, or raise max_bytes",
-        )
+        if max(extent) > MOST_EXTENT:
+            self.stream.fail(
+                f"leaves and tiles span {' x '.join(map(str, extent))} samples: more than the limit of"
+                f" {MOST_EXTENT} along an axis",
+                PRUNE,
+            )
 
     def read_leaves(self) -> None:
         """Values and masks of all leaves, in the order of their origins."""

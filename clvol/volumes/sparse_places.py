@@ -1,0 +1,117 @@
+"""What stands at the brick places of a sparse grid, found by sorted keys: no array over its box."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import chain
+
+import numpy as np
+
+from clvol.errors import VolumeError
+from clvol.volumes.files import place
+from clvol.volumes.grid import SparseGrid
+from clvol.volumes.tree import keys, rows_of, unique_places
+
+BRICK_CELLS = 8
+MOST_PLACES = 1 << 24
+"""Bricks that a sparse grid may need: they would take 49 GB."""
+_CHUNK_PLACES = 1 << 18
+_CORNERS = np.array(list(np.ndindex(2, 2, 2)))
+
+
+class SparsePlaces:
+    """Leaves and constants at brick places z, y, x, counted from `origin`, an index position (x, y, z).
+
+    shape : bricks per axis, z y x; one place more per axis can be asked for.
+    """
+
+    def __init__(self, grid: SparseGrid, origin: tuple[int, int, int], shape: tuple[int, int, int]) -> None:
+        self.background, self.shape = grid.background, shape
+        self._where = place(grid.source, grid.name)
+        self._origin = np.array(origin, np.int64)[::-1]
+        at = (grid.leaf_origins[:, ::-1] - self._origin) // BRICK_CELLS
+        inside = np.flatnonzero(self._holds(at))
+        order = np.argsort(keys(at[inside]), kind="stable")
+        self.leaf_places, self._leaf_rows = at[inside[order]], inside[order]
+        self._leaf_keys = keys(self.leaf_places)
+        self._tiles = [self._tiles_of(grid, int(edge)) for edge in np.unique(grid.tile_sizes)]
+
+    def _holds(self, places: np.ndarray) -> np.ndarray:
+        return ((places >= 0) & (places <= np.array(self.shape))).all(axis=1)
+
+    def _tiles_of(self, grid: SparseGrid, edge: int) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
+        """Edge, first brick places, keys and values of tiles of one size, those far outside left out."""
+        own = np.flatnonzero(grid.tile_sizes == edge)
+        start = (grid.tile_origins[own, ::-1] - self._origin) // BRICK_CELLS
+        at = grid.tile_origins[own, ::-1] // edge - self._origin // edge
+        inside = ((at >= 0) & (start <= np.array(self.shape))).all(axis=1)
+        key = keys(at[inside])
+        order = np.argsort(key)
+        return edge, start[inside][order], key[order], grid.tile_values[own][inside][order]
+
+    def leaf(self, places: np.ndarray) -> np.ndarray:
+        """Number of the leaf at each place, int (...), or -1."""
+        if not len(self._leaf_rows):
+            return np.full(places.shape[:-1], -1, np.intp)
+        row = rows_of(self._leaf_keys, keys(places))
+        return np.where(row >= 0, self._leaf_rows[row], -1)
+
+    def constant(self, places: np.ndarray) -> np.ndarray:
+        """Value of the tile at each place, float32 (...), or the background; leaves are not looked at."""
+        values = np.full(places.shape[:-1], self.background, np.float32)
+        for edge, _, tile_keys, tile_values in self._tiles:
+            # a place and its tile have the same cell of the lattice of that edge
+            cell = (places * BRICK_CELLS + self._origin) // edge - self._origin // edge
+            row = rows_of(tile_keys, keys(cell))
+            values = np.where(row >= 0, np.append(tile_values, np.float32(0))[row], values)
+        return values.astype(np.float32)
+
+    def changing(self) -> np.ndarray:
+        """Places of bricks whose samples, far faces included, meet a leaf or two constants: int (n, 3).
+
+        Raises VolumeError where they are more than MOST_PLACES.
+        """
+        found, pending = np.empty((0, 3), np.int64), []
+        for part in self._candidates():
+            pending.append(part[self._meets(part)])
+            if sum(map(len, pending)) > max(len(found), _CHUNK_PLACES):
+                found, pending = self._joined([found, *pending]), []
+        return self._joined([found, *pending])
+
+    def _joined(self, parts: list[np.ndarray]) -> np.ndarray:
+        places, _ = unique_places(np.concatenate(parts))
+        if len(places) > MOST_PLACES:
+            raise VolumeError(
+                f"more than {MOST_PLACES} bricks of 8³ voxels hold something",
+                self._where,
+                "use a smaller grid",
+            )
+        return places
+
+    def _candidates(self) -> Iterator[np.ndarray]:
+        """Places at leaves and at borders of tiles, as far as they lie inside, a bounded chunk at a time."""
+        limit = np.array(self.shape)
+        for part in chain(self._at_leaves(), self._tile_borders()):
+            yield part[((part >= 0) & (part < limit)).all(axis=1)]
+
+    def _meets(self, places: np.ndarray) -> np.ndarray:
+        around = places[:, None] + _CORNERS
+        constant = self.constant(around)
+        return (self.leaf(around) >= 0).any(axis=1) | (constant != constant[:, :1]).any(axis=1)
+
+    def _at_leaves(self) -> Iterator[np.ndarray]:
+        """Places of bricks that reach into a leaf."""
+        step = _CHUNK_PLACES // len(_CORNERS)
+        for first in range(0, len(self.leaf_places), step):
+            yield (self.leaf_places[first : first + step, None] - _CORNERS).reshape(-1, 3)
+
+    def _tile_borders(self) -> Iterator[np.ndarray]:
+        """Brick places at the six sides of every tile, one layer within and one without."""
+        for edge, starts, _, _ in self._tiles:
+            n = edge // BRICK_CELLS
+            plane = np.stack(np.meshgrid(*[np.arange(-1, n)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
+            sides = [np.insert(plane, axis, layer, axis=1) for axis in range(3) for layer in (-1, n - 1)]
+            shell, _ = unique_places(np.concatenate(sides) + 1)
+            step = max(1, _CHUNK_PLACES // len(shell))
+            for first in range(0, len(starts), step):
+                yield (starts[first : first + step, None] + shell - 1).reshape(-1, 3)
