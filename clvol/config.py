@@ -101,11 +101,6 @@ class KernelConfig:
         return self.majorant != "none" and self.nee and self.transmittance == "residual-ratio"
 
     @property
-    def first_weight(self) -> float:
-        """Weight of a new path: a channel chosen with probability 1/3 counts three times."""
-        return 3.0 if self.one_channel_per_path else 1.0
-
-    @property
     def nee(self) -> bool:
         """Next-event estimation: there are lights to sample, and media or surfaces that scatter to them."""
         f = self.features
