@@ -26,6 +26,7 @@ from clvol.material_facts import (
     samples_lights,
 )
 from clvol.pixel_filter import SIGNED
+from clvol.rows import bands
 from clvol.scene import records
 from clvol.scene.materials import Bsdf
 from clvol.scene.phase import phase_lobes
@@ -298,7 +299,7 @@ def _glows_in_the_dark(medium: records.Medium) -> bool:
 def _emitter_is_grey(emitter: records.Emitter) -> bool:
     if isinstance(emitter, records.EnvmapEmitter):
         r = emitter.radiance
-        return bool((r[..., 0] == r[..., 1]).all() and (r[..., 0] == r[..., 2]).all())
+        return all(bool((r[rows] == r[rows, :, :1]).all()) for rows in bands(*r.shape[:2]))
     value = {
         records.ConstantEmitter: "radiance",
         records.DirectionalEmitter: "irradiance",

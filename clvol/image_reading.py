@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import OpenImageIO as oiio  # noqa: N813
 
-MAX_PIXELS = 2**28
+MAX_PIXELS = 2**27
+"""16,384 x 8,192: as an environment 1.6 GB of texels and 0.5 GB of tables, here and again on the device."""
 _END, _STUFFED, _FILL = 0xD9, 0x00, 0xFF
 _WITHOUT_LENGTH = (_STUFFED, 0x01, *range(0xD0, _END))
 """What may stand after 0xFF in a JPEG without the length of a segment behind it."""
@@ -60,8 +61,11 @@ def read_stored(path: str, channels: int | None = None) -> Stored:
 
 def _read(opened: Any, path: str, channels: int | None) -> Stored:
     spec = opened.spec()
-    if spec.width * spec.height > MAX_PIXELS or spec.depth > 1:
-        raise UnreadableError(f"it has more than {MAX_PIXELS} pixels, or several layers")
+    if spec.width * spec.height > MAX_PIXELS:
+        size = f"{spec.width} x {spec.height}"
+        raise UnreadableError(f"it is {size}, which is more than the limit of {MAX_PIXELS} pixels")
+    if spec.depth > 1:
+        raise UnreadableError("it has several layers")
     count = min(spec.nchannels, channels or spec.nchannels)
     pixels = opened.read_image(0, 0, 0, count, oiio.FLOAT)
     if pixels is None:

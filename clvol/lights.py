@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from clvol import layout
-from clvol.environment import envmap_distribution, luminance
+from clvol.environment import envmap_distribution, luminance, mean_luminance
 from clvol.scene import records
 
 QUADRICS = ("sphere", "disk", "cylinder")
@@ -153,7 +153,7 @@ def envmap_arrays(emitter: records.EnvmapEmitter) -> dict[str, np.ndarray]:
     marginal, conditional = envmap_distribution(emitter.radiance)
     return {
         "envmap": record,
-        "env_texels": emitter.radiance.astype(np.float32),
+        "env_texels": emitter.radiance.astype(np.float32, copy=False),
         "env_marginal": marginal,
         "env_conditional": conditional,
     }
@@ -184,7 +184,7 @@ def _describe_emitter(record: np.void, emitter: records.Emitter, centre: np.ndar
         case records.ConstantEmitter():
             value, extent = emitter.radiance, 4 * np.pi * disc
         case records.EnvmapEmitter():
-            value, extent = (float(luminance(emitter.radiance).mean()),), 4 * np.pi * disc
+            value, extent = (mean_luminance(emitter.radiance),), 4 * np.pi * disc
         case records.DirectionalEmitter():
             value, extent = emitter.irradiance, disc
             record["vector"] = emitter.direction

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from clvol import layout
+from clvol.rows import bands
 from clvol.scene.materials import Bitmap, Checkerboard, Texture
 
 LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
@@ -61,8 +62,12 @@ class TextureTable:
         key = (id(pixels), as_number)
         if key not in self._first:
             self._first[key] = self._used
-            flat = np.ascontiguousarray(pixels, np.float32).reshape(-1, 3)
-            grey = np.repeat((flat @ LUMINANCE)[:, None], 3, axis=1) if as_number else flat
-            self.texels.append(grey.astype(np.float32))
-            self._used += len(flat)
+            texels = np.ascontiguousarray(pixels, np.float32).reshape(-1, 3)
+            if as_number:
+                grey = np.empty_like(texels)
+                for rows in bands(len(texels), 1):
+                    grey[rows] = (texels[rows] @ LUMINANCE)[:, None]
+                texels = grey
+            self.texels.append(texels)
+            self._used += len(texels)
         return self._first[key]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from clvol.rows import bands
 from clvol.scene.files import find_parameter
 from clvol.scene.image import image_from_array, read_image
 from clvol.scene.reader import BRIGHTEST, Reader
@@ -60,19 +61,28 @@ def envmap(reader: Reader) -> EnvmapEmitter:
         reader.fail(
             f"an envmap has at least 2 x 3 pixels, got {radiance.shape[1]} x {radiance.shape[0]}", place
         )
-    radiance = radiance * np.float32(reader.number("scale", 1.0, minimum=0.0))
-    broken = ~np.isfinite(radiance) | (radiance < -NEGLIGIBLE * radiance.max()) | (radiance > BRIGHTEST)
-    if broken.any():
-        row, column = np.argwhere(broken)[0][:2]
-        reader.fail(
-            f"radiance must be finite and >= 0; it is not at row {row}, column {column}",
-            place,
-            f"at most {BRIGHTEST:g}",
-        )
+    _check_radiance(reader, radiance, np.float32(reader.number("scale", 1.0, minimum=0.0)), place)
     to_world = reader.transform()
     if not keeps_angles(to_world):
         reader.fail("to_world of an envmap must not stretch or shear it", "to_world", "rotate it only")
-    return EnvmapEmitter(np.maximum(radiance, 0), to_world, source)
+    return EnvmapEmitter(radiance, to_world, source)
+
+
+def _check_radiance(reader: Reader, radiance: np.ndarray, scale: np.float32, place: str) -> None:
+    """Multiply a picture by `scale` and take slightly negative values as 0, in place; refuse others."""
+    largest = radiance.max() * scale
+    for rows in bands(*radiance.shape[:2]):
+        band = radiance[rows]
+        band *= scale
+        broken = ~np.isfinite(band) | (band < -NEGLIGIBLE * largest) | (band > BRIGHTEST)
+        if broken.any():
+            row, column = np.argwhere(broken)[0][:2]
+            reader.fail(
+                f"radiance must be finite and >= 0; it is not at row {rows.start + row}, column {column}",
+                place,
+                f"at most {BRIGHTEST:g}",
+            )
+        np.maximum(band, 0, out=band)
 
 
 def directional(reader: Reader) -> DirectionalEmitter:

@@ -7,6 +7,7 @@ import numpy as np
 from clvol.errors import SceneError
 from clvol.image_reading import UnreadableError, read_stored
 from clvol.masks import masked_count
+from clvol.rows import bands
 from clvol.scene.spectra import srgb_to_linear
 
 
@@ -22,12 +23,12 @@ def read_image(path: str, where: str, raw: bool = False) -> np.ndarray:
         At `where`: not an image, damaged, or larger than `image_reading.MAX_PIXELS`.
     """
     try:
-        stored = read_stored(path, channels=4)
+        stored = read_stored(path, channels=3)
     except UnreadableError as error:
         raise SceneError(f"cannot read image '{path}'", where, str(error)) from None
     integers = stored.type_name in ("uint8", "uint16")
     encoded = stored.type_name == "uint8" or (integers and stored.format_name == "png")
-    return _linear_rgb(stored.pixels, encoded and not raw)
+    return _linear_rgb(stored.pixels, encoded and not raw, in_place=True)
 
 
 def image_from_array(array: np.ndarray, where: str, raw: bool = False) -> np.ndarray:
@@ -47,13 +48,19 @@ def image_from_array(array: np.ndarray, where: str, raw: bool = False) -> np.nda
     pixels = array[..., None] if array.ndim == 2 else array
     if pixels.ndim != 3 or not 1 <= pixels.shape[2] <= 4 or pixels.size == 0:
         raise SceneError(f"expected an image (height, width, 3), got shape {array.shape}", where)
-    if pixels.dtype.kind != "f":
-        if pixels.dtype not in (np.uint8, np.uint16):
-            raise SceneError(f"expected floats, uint8 or uint16, got {array.dtype}", where)
-        pixels = pixels / np.float32(np.iinfo(pixels.dtype).max)
+    if pixels.dtype.kind != "f" and pixels.dtype not in (np.uint8, np.uint16):
+        raise SceneError(f"expected floats, uint8 or uint16, got {array.dtype}", where)
     return _linear_rgb(pixels, array.dtype == np.uint8 and not raw)
 
 
-def _linear_rgb(pixels: np.ndarray, encoded: bool) -> np.ndarray:
-    rgb = pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
-    return np.ascontiguousarray(srgb_to_linear(rgb) if encoded else rgb, dtype=np.float32)
+def _linear_rgb(pixels: np.ndarray, encoded: bool, in_place: bool = False) -> np.ndarray:
+    """Linear RGB of a picture, float32 (height, width, 3), never the array itself unless `in_place`."""
+    height, width, channels = pixels.shape
+    same = in_place and channels == 3 and pixels.dtype == np.float32 and pixels.flags.writeable
+    linear = pixels if same else np.empty((height, width, 3), np.float32)
+    for rows in bands(height, width):
+        rgb = pixels[rows, :, :3] if channels >= 3 else pixels[rows, :, :1]
+        if rgb.dtype.kind != "f":
+            rgb = rgb / np.float32(np.iinfo(rgb.dtype).max)
+        linear[rows] = srgb_to_linear(rgb) if encoded else rgb
+    return linear

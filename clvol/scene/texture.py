@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from clvol.rows import bands
 from clvol.scene.files import find_parameter
 from clvol.scene.image import image_from_array, read_image
 from clvol.scene.materials import Bitmap, Checkerboard, Texture
@@ -26,13 +27,16 @@ def bitmap(reader: Reader) -> Bitmap:
     else:
         place = source = "bitmap"
         pixels = image_from_array(reader.array(place), reader.node.place(place), raw)
-    broken = ~((pixels >= -NEGLIGIBLE) & (pixels <= 1 + NEGLIGIBLE))
-    if broken.any():
-        row, column = np.argwhere(broken)[0][:2]
-        shown = pixels[row, column].tolist()
-        reader.fail(f"texels must be in [0, 1]; at row {row}, column {column} there is {shown}", place)
+    for rows in bands(*pixels.shape[:2]):
+        band = pixels[rows]
+        broken = ~((band >= -NEGLIGIBLE) & (band <= 1 + NEGLIGIBLE))
+        if broken.any():
+            row, column = np.argwhere(broken)[0][:2]
+            shown, row = band[row, column].tolist(), rows.start + row
+            reader.fail(f"texels must be in [0, 1]; at row {row}, column {column} there is {shown}", place)
+        np.clip(band, 0, 1, out=band)
     return Bitmap(
-        np.clip(pixels, 0, 1),
+        pixels,
         _to_uv(reader),
         reader.string("filter_type", "bilinear", ("bilinear", "nearest")),
         reader.string("wrap_mode", "repeat", ("repeat", "mirror", "clamp")),
