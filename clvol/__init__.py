@@ -21,6 +21,7 @@ _EXPORTS = {
     "merge": "clvol.result",
     "OptionError": "clvol.errors",
     "render": "clvol.renderer",
+    "RenderError": "clvol.errors",
     "Result": "clvol.result",
     "rotate": "clvol.scene",
     "scale": "clvol.scene",

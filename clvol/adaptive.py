@@ -17,7 +17,7 @@ import numpy as np
 from clvol.film import Film
 from clvol.progress import Progress, ProgressCallback
 from clvol.result import relative_noise
-from clvol.session import MAX_SAMPLES, Session, seed_words
+from clvol.session import MAX_SAMPLES, Session, nothing_finished, seed_words
 
 log = logging.getLogger("clvol")
 
@@ -170,7 +170,7 @@ class TargetRender:
         self,
         time_limit: float | None,
         callback: ProgressCallback | None,
-        interrupted: Callable[[], bool],
+        interrupted: Callable[[], int],
     ) -> int:
         """Render until the pilot says that the error is below the target; returns the mean of the samples."""
         self.started = time.perf_counter()
@@ -184,6 +184,8 @@ class TargetRender:
                 self._add(self.picture, plan)
         if not self.picture.samples.all():  # not even the pilot was finished in time
             self._add(self.picture, CHUNK * everywhere)
+        if not self.picture.samples.all():
+            raise nothing_finished(interrupted())
         self.wavefront.use_film(self.picture)
         self.session.seconds = time.perf_counter() - self.started
         self._report_end()
@@ -244,9 +246,9 @@ class TargetRender:
                 tell = lambda progressed, at=pixels: self._tell(film, at, progressed.samples_done, goal)  # noqa: E731
                 film.samples[pixels] += self.wavefront.run(0, 1 << bit, self._stopped, tell)
 
-    def _stopped(self) -> bool:
+    def _stopped(self) -> int:
         late = self.time_limit is not None and time.perf_counter() - self.started >= self.time_limit
-        return late or self.interrupted()
+        return max(late, self.interrupted())
 
     def _tell(self, film: Film, pixels: np.ndarray, added: int, goal: np.ndarray) -> None:
         """Report that `added` samples of `pixels`, not yet counted by `film`, are finished."""

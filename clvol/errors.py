@@ -66,5 +66,9 @@ class DeviceError(Error):
     longest = sys.maxsize
 
 
+class RenderError(Error):
+    """A render that was to end before it had a picture."""
+
+
 class OptionError(Error):
     """A choice (technique, majorant, sample count, …) that is unknown or impossible."""

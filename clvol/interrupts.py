@@ -36,6 +36,10 @@ class Interrupt:
         """Whether there was any."""
         return self.level > 0
 
+    def urgency(self) -> int:
+        """The level: a render is told it whenever it asks."""
+        return self.level
+
     @property
     def status(self) -> int:
         """Exit status of a command that they ended, by the shell's convention."""

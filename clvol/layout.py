@@ -206,7 +206,7 @@ ENUMS = {
     "TEXTURE": ("BITMAP", "CHECKERBOARD"),
     "WRAP": ("REPEAT", "MIRROR", "CLAMP"),
     "QUEUE": ("GENERATE", "INTERSECT", "MEDIUM", "SHADE", "SHADOW"),
-    "EVENT": ("ESCAPE", "COLLISION", "SURFACE"),
+    "EVENT": ("ESCAPE", "COLLISION", "SURFACE", "WALK", "SHADOW"),
     "ABSORPTION": tuple(registry.ABSORPTIONS),
     "PROBABILITY": tuple(registry.PROBABILITIES),
     "CONTROL": ("NEXT_JOB", "JOB_LIMIT", "NON_FINITE", "DONE"),  # DONE: one counter per pass in the ring
@@ -227,6 +227,15 @@ class PathField:
     kind: str
     meaning: str
     needed: bool = True
+
+
+def _legs(prefix: str, needed: bool) -> list[PathField]:
+    """Where a walk stands that goes on in the next wave; the place is a sum of two floats."""
+    return [
+        PathField(f"{prefix}leg", "u", "legs that the walk has behind it", needed),
+        PathField(f"{prefix}walked", "f", "ray parameter that it has come to", needed),
+        PathField(f"{prefix}walked_rest", "f", "what rounding took from it", needed),
+    ]
 
 
 def path_fields(config: KernelConfig) -> list[PathField]:
@@ -263,6 +272,7 @@ def path_fields(config: KernelConfig) -> list[PathField]:
         PathField("channel", "u", "the one channel this path follows", config.one_channel_per_path),
         PathField("pdf", "f", "density of the last direction; 0 where MIS does not apply", config.mis),
         PathField("medium", "i", "medium of the collision", features.media > 1),
+        *_legs("", features.heterogeneous),
         PathField(
             "interval_end",
             "f",
@@ -299,8 +309,31 @@ def path_fields(config: KernelConfig) -> list[PathField]:
             for word in range(features.boundary_words)
         ),
         *(
-            PathField(f"shadow_{c}", "f", "unattenuated light of next-event estimation", config.nee)
+            PathField(
+                f"shadow_{c}",
+                "f",
+                "light of next-event estimation, where it is not attenuated yet",
+                config.nee,
+            )
             for c in spectrum
+        ),
+        PathField("next", "u", "queue that waits for the path when its shadow ray is through", config.nee),
+        *_legs("shadow_", config.nee and features.heterogeneous),
+        PathField(
+            "shadow_medium",
+            "u",
+            "medium it is in",
+            config.nee and features.heterogeneous and features.media > 1,
+        ),
+        *(
+            PathField(
+                f"shadow_{name}", kind, meaning, config.nee and features.heterogeneous and features.passable
+            )
+            for name, kind, meaning in (
+                ("stretch", "u", "surfaces that it has passed"),
+                ("after_t", "f", "ray parameter of the last of them"),
+                ("after_primitive", "u", "primitive of the last of them"),
+            )
         ),
         *(PathField(name, "f", "what a picture of the first hit shows") for name in first_hit_fields(config)),
         PathField("cut", "u", "statistics of the slot: paths ended by max_depth", features.depth_limited),

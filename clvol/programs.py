@@ -123,6 +123,8 @@ def geometry_headers(config: KernelConfig, stage: str) -> list[str]:
         headers.append("geometry/interval.h")
         if features.stretches or stage == "shadow_transmittance":
             headers.append("stages/media.h")
+        if stage != "intersect":
+            headers.append("stages/legs.h")
     return headers
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -13,6 +14,10 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress as RichBar
     from rich.progress import TaskID
+
+
+_READING_PACE = 20.0
+"""Times what a reading of the noise took that passes before the next."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +36,7 @@ class Progress:
         Seconds after which no new sample is begun.
     noise : float
         Mean relative standard error of the image so far (`clvol.result.relative_noise`); nan while unknown.
+        Where reading it for each record would cost much, foreseen from the last one read.
     what : str
         What is going on; samples are those of the picture only while it is "rendering", else steps.
     """
@@ -66,6 +72,30 @@ class Progress:
 
 ProgressCallback = Callable[[Progress], None]
 """What ``clvol.render(progress=...)`` accepts besides True and False."""
+
+
+class FilmNoise:
+    """The noise of the picture so far, at a small share of the render's time.
+
+    It is read from the film as long as that takes no more than a twentieth of the time; passes between two
+    readings are told what the last one becomes by so many more samples, of independent errors.
+
+    read : noise of the film, given the samples per pixel that it has.
+    """
+
+    def __init__(self, read: Callable[[int], float], clock: Callable[[], float] = time.perf_counter) -> None:
+        self._read, self._clock = read, clock
+        self._noise, self._samples = math.nan, 0
+        self._due = -math.inf
+
+    def after(self, samples: int, exact: bool = False) -> float:
+        """The noise after so many samples per pixel; read whatever it costs where it has to be exact."""
+        start = self._clock()
+        if exact or start >= self._due:
+            self._noise, self._samples = self._read(samples), samples
+            end = self._clock()
+            self._due = end + _READING_PACE * (end - start)
+        return self._noise * math.sqrt(self._samples / samples)
 
 
 def format_samples(record: Progress) -> str:

@@ -66,7 +66,8 @@ def render(
         transmittances that stay unbiased there.
     step : world length of a step of ray marching; the edge of a voxel by default.
     aov : names from `registry.AOVS` to add to `result.aovs`: means per sample ("largest_weight": maxima).
-    time_limit : seconds after which no new pass of samples is begun; alone it replaces `spp`.
+    time_limit : seconds after which no new pass of samples is begun; alone it replaces `spp`.  Passes begun
+        are finished, unless paths go on for more than 10 seconds (30 where no pass is finished yet).
     target_error : mean relative standard error (`Result.noise`) at which the render ends, judged by a pilot
         that is not in the picture; pixels get samples by their noise.  `spp` then is the most on the mean.
     device : index or part of the name of an OpenCL device (see `clvol devices`).
@@ -77,11 +78,13 @@ def render(
     Returns
     -------
     Result.  Ctrl-C finishes the paths in flight and returns the picture so far, with
-    ``stats["interrupted"]`` set; a second Ctrl-C raises KeyboardInterrupt.
+    ``stats["interrupted"]`` set; a second Ctrl-C does not wait for them and keeps the samples that every
+    pixel has; a third raises KeyboardInterrupt.
 
     Raises
     ------
     OptionError, SceneError, VolumeError, DeviceError : a choice, scene, volume or device that won't do.
+    RenderError : the render was to end, and no pass of samples ever did.
     """
     if not isinstance(scene, Scene):
         raise OptionError(
@@ -118,11 +121,11 @@ def render(
     session.warn_of_unused(asked)
     with interruptible() as interrupt:
         with bar as callback:
-            interrupt.heed(patience=1)
+            interrupt.heed(patience=2)
             if target_error is None:
-                done = session.run(first, count, time_limit, callback, interrupt.asked)
+                done = session.run(first, count, time_limit, callback, interrupt.urgency)
             else:
-                done = TargetRender(session, target_error, spp).run(time_limit, callback, interrupt.asked)
+                done = TargetRender(session, target_error, spp).run(time_limit, callback, interrupt.urgency)
             interrupt.keep()
         result = session.result(first, done)
         result.stats["interrupted"] = interrupt.asked()

@@ -16,11 +16,12 @@ from clvol.camera import camera_rays
 from clvol.choices import Choices, prepare_for, resolve
 from clvol.config import KernelConfig
 from clvol.device import Device
+from clvol.errors import RenderError
 from clvol.outcome import make_result
 from clvol.pixel_filter import FILTER_BINS
 from clvol.prepare import PreparedScene
 from clvol.programs import build_stages
-from clvol.progress import Progress, ProgressCallback
+from clvol.progress import FilmNoise, Progress, ProgressCallback
 from clvol.result import Result, relative_noise
 from clvol.scene.records import Scene
 from clvol.upload import upload_scene
@@ -29,8 +30,6 @@ from clvol.wavefront import Pool, Progressed, Wavefront
 log = logging.getLogger("clvol")
 MAX_SAMPLES = 2**32 - 1
 """Samples of a pixel are numbered in 32 bits; a render without an end asks for all of them."""
-_NOISE_SECONDS = 0.5
-"""The noise shown by the progress bar is read from the film at most this often."""
 
 
 @dataclass(eq=False)
@@ -170,24 +169,28 @@ class Session:
         count: int,
         time_limit: float | None,
         callback: ProgressCallback | None,
-        interrupted: Callable[[], bool],
+        interrupted: Callable[[], int],
     ) -> int:
-        """Render samples; returns how many of each pixel were done."""
+        """Render samples; returns how many of each pixel were done.
+
+        `interrupted` says how urgently an end is asked for, as `Wavefront.run` takes it.
+        """
         started = time.perf_counter()
         total = count if count < MAX_SAMPLES else None
-        last_noise = [float("nan"), -_NOISE_SECONDS]
+        noise = FilmNoise(lambda done: self._noise(first, done))
 
-        def should_stop() -> bool:
-            return interrupted() or (time_limit is not None and time.perf_counter() - started >= time_limit)
+        def should_stop() -> int:
+            return max(interrupted(), time_limit is not None and time.perf_counter() - started >= time_limit)
 
         def report(progressed: Progressed) -> None:
-            if callback is None:
-                return
-            if progressed.seconds - last_noise[1] >= _NOISE_SECONDS:
-                last_noise[:] = self._noise(first, progressed.samples_done), progressed.seconds
-            callback(Progress(progressed.samples_done, total, progressed.seconds, time_limit, last_noise[0]))
+            if callback is not None:
+                done = progressed.samples_done
+                noise_now = noise.after(done, exact=done == total)
+                callback(Progress(done, total, progressed.seconds, time_limit, noise_now))
 
         done = self.wavefront.run(first, count, should_stop, report)
+        if done == 0:
+            raise nothing_finished(interrupted())
         self.seconds = time.perf_counter() - started
         return done
 
@@ -198,6 +201,16 @@ class Session:
     def result(self, first: int, count: int) -> Result:
         """The film as a Result, with what it cost."""
         return make_result(self, first, count)
+
+
+def nothing_finished(urgency: int) -> BaseException:
+    """What is raised where a render had to end and no pass of samples was finished."""
+    if urgency > 1:
+        return KeyboardInterrupt()
+    return RenderError(
+        "the render was to end, but its first samples did not: paths in flight go on for very long",
+        hint="limit them with max_depth, lower majorant_scale or the density, or give more time",
+    )
 
 
 def kernel_config(prepared: PreparedScene, choices: Choices, device: Device) -> KernelConfig:

@@ -8,6 +8,7 @@ are in flight together, so that no slot waits for a pass to end.
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from clvol.device import Device, set_arguments
 from clvol.errors import OptionError
 from clvol.film import Film
 
+log = logging.getLogger("clvol")
 NO_JOB = 0xFFFFFFFF
 _NEXT_JOB, _JOB_LIMIT, _NON_FINITE, _DONE = (layout.enum("CONTROL", n) for n in layout.ENUMS["CONTROL"])
 _MAX_ROUND_JOBS = 1 << 31
@@ -28,6 +30,11 @@ _HARVEST_SECONDS = 2.0
 """Statistics of the slots are collected at least this often: their 32-bit counters must not run over."""
 _BATCH_SECONDS = 0.02
 """Waves are launched in batches of about this length; between batches the host reads the counters."""
+_PATIENCE_SECONDS = 10.0
+"""How long paths in flight are waited for once the render is to end: hardly any path takes as long, but some
+never end.  Whole passes that then lack a path are dropped."""
+_FIRST_PATIENCE_SECONDS = 30.0
+"""The same where no pass is finished yet: without one there is no picture."""
 
 
 @dataclass(frozen=True)
@@ -165,16 +172,18 @@ class Wavefront:
         self,
         first: int,
         count: int,
-        should_stop: Callable[[], bool],
+        should_stop: Callable[[], int],
         report: Callable[[Progressed], None],
     ) -> int:
         """Render samples `first` .. `first + count` of every pixel listed; return how many were done.
 
-        `should_stop` is asked between batches; once it says yes no new pass is begun, and the passes in
-        flight are finished, never dropped (dropping would favour short paths).
+        `should_stop` is asked between batches.  Once it says 1 no new pass is begun, and the passes in
+        flight are finished, not dropped (dropping favours short paths), as long as patience lasts; at 2 only
+        what is finished is kept.
         """
         done = 0
         start = time.perf_counter()
+        self._stopping_since: float | None = None
         per_round = max(1, _MAX_ROUND_JOBS // (self.pass_samples * self.sample_jobs)) * self.pass_samples
         while done < count and not (done and should_stop()):
             part = min(count - done, per_round)
@@ -183,6 +192,7 @@ class Wavefront:
                 part,
                 should_stop,
                 lambda n, base=done: report(Progressed(base + n, time.perf_counter() - start)),
+                done > 0,
             )
             done += finished
             if finished < part:
@@ -190,9 +200,14 @@ class Wavefront:
         return done
 
     def _run_round(
-        self, first: int, count: int, should_stop: Callable[[], bool], report: Callable[[int], None]
+        self,
+        first: int,
+        count: int,
+        should_stop: Callable[[], int],
+        report: Callable[[int], None],
+        earlier: bool,
     ) -> int:
-        """One numbering of jobs: fewer than 2³¹ of them."""
+        """One numbering of jobs: fewer than 2³¹ of them; `earlier`: a round before has samples."""
         passes = -(-count // self.pass_samples)
         samples = [self.pass_samples] * passes
         samples[-1] = count - (passes - 1) * self.pass_samples
@@ -201,14 +216,12 @@ class Wavefront:
         begun = finished = 0
         waves = 1
         while True:
-            if not (begun and should_stop()):
-                allowed = min(passes, finished + self.pool.ring_passes)
-            else:
-                allowed = begun
+            urgency = should_stop() if begun else 0
+            allowed = begun if urgency else min(passes, finished + self.pool.ring_passes)
             limit = sum(samples[:allowed]) * self.sample_jobs
             self._write("control", np.array([limit], np.uint32), 4 * _JOB_LIMIT)
-            elapsed = self._launch(waves)
-            waves = int(np.clip(waves * _BATCH_SECONDS / max(elapsed, 1e-6), 1, max(2 * waves, 4)))
+            launched, elapsed = self._launch(waves)
+            waves = int(np.clip(launched * _BATCH_SECONDS / max(elapsed, 1e-6), 1, max(2 * launched, 4)))
             if time.perf_counter() - self._harvested > _HARVEST_SECONDS:
                 self._harvest()
             control = self._read_control()
@@ -222,6 +235,28 @@ class Wavefront:
                 report(sum(samples[:finished]))
             if finished == passes or (finished == begun and begun and should_stop()):
                 return sum(samples[:finished])
+            if self._out_of_patience(urgency, finished > 0 or earlier):
+                self._abandon(begun - finished)
+                return sum(samples[:finished])
+
+    def _out_of_patience(self, urgency: int, some_finished: bool) -> bool:
+        """Whether paths in flight are no longer waited for."""
+        if urgency == 0:
+            return False
+        now = time.perf_counter()
+        if self._stopping_since is None:
+            self._stopping_since = now
+        patience = _PATIENCE_SECONDS if some_finished else _FIRST_PATIENCE_SECONDS
+        return urgency > 1 or now - self._stopping_since > patience
+
+    def _abandon(self, passes: int) -> None:
+        """Give up the paths in flight, and with them the passes that they belong to."""
+        log.warning("dropped %d unfinished passes, whose paths did not end", passes)
+        fresh = {"job": NO_JOB, "leg": 0, "shadow_leg": 0}
+        for row, field in enumerate(self.fields):
+            if field.name in fresh:
+                values = np.full(self.stride, fresh[field.name], np.uint32)
+                self._write("state", values, values.nbytes * row)
 
     def warm_up(self) -> None:
         """Run every kernel once with nothing to do: some drivers (PoCL) compile at the first launch, which
@@ -244,24 +279,36 @@ class Wavefront:
         counts[:, len(layout.ENUMS["QUEUE"])] = self.config.group_slots  # all slots idle
         self._write("counts", counts)
 
-    def _launch(self, waves: int) -> float:
-        """Run `waves` waves; return the seconds they took on the device, and book them by stage."""
+    def _launch(self, waves: int) -> tuple[int, float]:
+        """Run up to `waves` waves; return how many and the seconds they took, which are booked by stage.
+
+        One wave is queued behind the one that runs, so that a batch that turns out long can be cut.
+        """
         queue, size = self.device.queue, (self.groups * self.config.local_size,)
         local = (self.config.local_size,)
-        events = [
-            (stage, cl.enqueue_nd_range_kernel(queue, self.kernels[stage], size, local))
-            for _ in range(waves)
-            for stage in self.config.stages
-        ]
-        self.launches += len(events)
-        self.waves += waves
-        events[-1][1].wait()
+        launched: list[list[cl.Event]] = []
+        start = time.perf_counter()
+        while len(launched) < waves:
+            launched.append(
+                [
+                    cl.enqueue_nd_range_kernel(queue, self.kernels[stage], size, local)
+                    for stage in self.config.stages
+                ]
+            )
+            if len(launched) > 1:
+                launched[-2][-1].wait()
+                if time.perf_counter() - start > 2 * _BATCH_SECONDS:
+                    break
+        launched[-1][-1].wait()
+        self.launches += len(launched) * len(self.config.stages)
+        self.waves += len(launched)
         total = 0.0
-        for stage, event in events:
-            seconds = 1e-9 * (event.profile.end - event.profile.start)
-            self.seconds[stage] += seconds
-            total += seconds
-        return total
+        for events in launched:
+            for stage, event in zip(self.config.stages, events, strict=True):
+                seconds = 1e-9 * (event.profile.end - event.profile.start)
+                self.seconds[stage] += seconds
+                total += seconds
+        return len(launched), total
 
     def _read_control(self) -> np.ndarray:
         control = np.empty(_DONE + self.pool.ring_passes, np.uint32)

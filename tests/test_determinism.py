@@ -192,9 +192,12 @@ def test_ctrl_c_keeps_whole_passes_of_every_pixel():
 
 
 @pytest.mark.usefixtures("ctrl_c")
-def test_a_second_ctrl_c_is_a_keyboard_interrupt():
+def test_a_second_ctrl_c_keeps_what_is_finished_and_a_third_is_a_keyboard_interrupt():
+    cut = interrupted_render(signals=2)
+    assert cut.stats["interrupted"] and 0 < cut.samples[1] < 50 * SPP
+    assert digest(cut) == digest(rendered(scene(), spp=cut.samples[1], seed=7))
     with pytest.raises(KeyboardInterrupt):
-        interrupted_render(signals=2)
+        interrupted_render(signals=3)
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 

@@ -37,7 +37,7 @@ COLLISION_BODY = (
     out1[i] = collision.beta;
     out4[i] = collision.emission;
 #endif
-    out2[i] = tally.violations + tally.exhausted;
+    out2[i] = tally.violations + tally.exhausted + tally.stopped;
     out3[i] = tally.lookups;
 """
 )
@@ -50,7 +50,7 @@ TRANSMITTANCE_BODY = (
 #else
     out0[i] = transmittance;
 #endif
-    out1[i] = tally.violations + tally.exhausted;
+    out1[i] = tally.violations + tally.exhausted + tally.stopped;
     out2[i] = tally.lookups;
 """
 )

@@ -1,5 +1,6 @@
 /* From: SHADE
-   To: INTERSECT (the path goes on) or GENERATE (it ended), and SHADOW (next-event estimation)
+   To: INTERSECT (the path goes on) or GENERATE (it ended), or before that SHADOW (next-event estimation);
+   MEDIUM or SHADOW (a walk that needed another wave)
    Reads: event, ray, hit, beta, what it is inside of, media, surfaces, emitters.
    Writes: radiance, beta, the next ray, its bounce and what it is inside of; the shadow ray; first hits, energy cut. */
 #include "stages/shade.h"

@@ -16,7 +16,7 @@ INLINE bool depth_is_reached(const Scene *scene, uint slot, uint bounce, Spectru
 }
 
 #if CLVOL_NEE
-/* Queues a shadow ray that brings `value` along if nothing is in its way. */
+/* Makes a shadow ray that brings `value` along if nothing is in its way; `shade` queues it. */
 INLINE void queue_shadow(const Scene *scene, uint group, uint slot, float3 from, const LightSample *light, Spectrum value)
 {
     set_path_shadow_x(scene, slot, light->direction.x);
@@ -34,7 +34,7 @@ INLINE void queue_shadow(const Scene *scene, uint group, uint slot, float3 from,
     set_path_shadow_primitive(scene, slot, light->primitive);
 #endif
     set_shadow(scene, slot, value);
-    queue_push(scene, group, QUEUE_SHADOW, slot);
+    set_path_event(scene, slot, EVENT_SHADOW);
 }
 #endif
 

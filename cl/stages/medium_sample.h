@@ -3,8 +3,21 @@
 #define CLVOL_STAGES_MEDIUM_SAMPLE_H
 #include "stages/medium_ray.h"
 
+/* Where the path's walk begins, or goes on: `from` where it has not begun. */
+#if CLVOL_HAS_HETEROGENEOUS
+CLVOL_WALKED_FIELD()
+#else
+INLINE Walked get_walked(const Scene *scene, uint slot, float from)
+{
+    const Walked walked = {0, from, 0.0f};
+    return walked;
+}
+#define set_walked(scene, slot, walked)
+#endif
+
 INLINE bool medium_collision(const MediumRay *in, uint4 k, Tally *tally, Collision *collision)
 {
+    tally->stopped = 0;
     Stream stream = stream_begin(k.z, k.w);
 #if CLVOL_HAS_HOMOGENEOUS
     if (is_homogeneous(in->medium))
@@ -13,9 +26,12 @@ INLINE bool medium_collision(const MediumRay *in, uint4 k, Tally *tally, Collisi
 #if CLVOL_HAS_HETEROGENEOUS
 #if CLVOL_EMISSION_ON_WALKS
     if (is_thin(in)) {
-        const Spectrum emission = collision->emission + thin_emission(in, k.x, &stream, tally, collision->beta);
+        const Spectrum before = collision->emission;
+        const Spectrum emission = thin_emission(in, k.x, &stream, tally, collision->beta);
         const bool collided = sample_collision(in, k.x, &stream, tally, collision);
-        collision->emission = emission; /* instead of what the walk met */
+        collision->emission = before; /* instead of what the walk met */
+        if (!tally->stopped || thin_point(in, k.x) < tally->stop_t) /* beyond, the next leg gathers it */
+            collision->emission += emission;
         return collided;
     }
 #endif
@@ -51,28 +67,35 @@ INLINE void record_walk(const Scene *scene, uint slot, Tally tally, Spectrum bet
 #if CLVOL_HAS_STRETCHES
 #include "stages/stretch_sample.h"
 #else
-/* The one medium of the scene, from the ray's start. */
-INLINE void medium_sample(const Scene *scene, uint group, uint slot)
+/* The one medium of the scene, from the ray's start.  Returns the steps that it took. */
+INLINE uint medium_sample(const Scene *scene, uint group, uint slot)
 {
     const SampleKey key = path_key(scene, slot);
     const Ray ray = path_ray(scene, slot);
-    const MediumRay in = medium_ray(scene, scene->media, ray, path_interval_end(scene, slot),
-                                    (int)path_channel_or_zero(scene, slot));
-    const uint4 k = decision_block(scene, key, BLOCK_WALK, 0);
+    const Walked walked = get_walked(scene, slot, 0.0f);
+    const MediumRay in = rest_of_ray(medium_ray(scene, scene->media, ray, path_interval_end(scene, slot),
+                                                (int)path_channel_or_zero(scene, slot)),
+                                     walked.t);
+    const uint4 k = leg_block(decision_block(scene, key, BLOCK_WALK, 0), walked.leg);
     Tally tally = {0, 0, 0, 0, 0, 0, 0.0f};
     Collision collision;
     collision.beta = get_beta(scene, slot);
     collision.emission = (Spectrum)(0.0f);
     const bool collided = medium_collision(&in, k, &tally, &collision);
+    const bool stopped = goes_on(walked, &tally);
 #if CLVOL_WEIGHTED
     subtract_background(scene, slot, in.medium, in.channel, collision.beta);
 #endif
     record_walk(scene, slot, tally, collision.beta, collision.emission);
-    if (collided) {
-        set_path_origin(scene, slot, ray.o + collision.t * ray.d);
+    if (stopped) {
+        set_walked(scene, slot, walk_on(walked, walked.t, tally.stop_t));
+        set_path_event(scene, slot, EVENT_WALK);
+    } else if (collided) {
+        set_path_origin(scene, slot, ray.o + (walked.t + collision.t) * ray.d);
         set_path_event(scene, slot, EVENT_COLLISION);
     }
     queue_push(scene, group, QUEUE_SHADE, slot);
+    return steps_of(&tally);
 }
 #endif
 

@@ -39,6 +39,21 @@ INLINE void queue_clear(const Scene *scene, uint group, uint queue)
         *queue_counter(scene, group, queue) = 0;
 }
 
+/* Steps of a work-item beyond which it leaves the other slots to the next wave, so that no launch takes long. */
+#define STAGE_STEPS (1u << 14)
+
+INLINE uint steps_of(const Tally *tally)
+{
+    return tally->tentative + tally->cells + tally->lookups;
+}
+
+/* Has the slot walk, or send its shadow ray, in the next wave. */
+INLINE void stand_by(const Scene *scene, uint group, uint slot, uint event)
+{
+    set_path_event(scene, slot, event);
+    queue_push(scene, group, QUEUE_SHADE, slot);
+}
+
 INLINE SampleKey path_key(const Scene *scene, uint slot)
 {
     SampleKey key;

@@ -3,6 +3,10 @@
 #define CLVOL_STAGES_SHADOW_TRANSMITTANCE_H
 #include "tracking/tally.h"
 
+#if CLVOL_HAS_HETEROGENEOUS
+CLVOL_WALKED_FIELD(shadow_)
+#endif
+
 #if CLVOL_HAS_MEDIA
 INLINE Extinction medium_transmittance(const MediumRay *in, uint4 k, Tally *tally)
 {
@@ -16,21 +20,41 @@ INLINE Extinction medium_transmittance(const MediumRay *in, uint4 k, Tally *tall
 #endif
 }
 
-/* Multiplies the transmittance of all media between `from` and `to`; false once nothing is left. */
-INLINE bool media_transmittance(const Scene *scene, SampleKey key, Ray ray, const Inside *inside, uint stretch, float from,
-                                float to, int channel, Tally *tally, Extinction *transmittance)
+/* Multiplies the transmittance of all media between `from` and `to`; false once nothing is left, or where a walk stops
+   short.  Where the walk has legs behind it, it goes on in the medium where it stopped. */
+INLINE bool media_transmittance(const Scene *scene, uint slot, SampleKey key, Ray ray, const Inside *inside, uint stretch,
+                                float from, float to, int channel, Tally *tally, Extinction *transmittance)
 {
-    for (uint m = 0; m < (CLVOL_HAS_MANY_MEDIA ? scene->render->media : 1u); ++m) {
+    Walked walked = {0, from, 0.0f};
+    uint m = 0;
+#if CLVOL_HAS_HETEROGENEOUS
+    walked = get_shadow_walked(scene, slot, from);
+#if CLVOL_HAS_MANY_MEDIA
+    m = walked.leg > 0 ? path_shadow_medium(scene, slot) : 0;
+#endif
+#endif
+    for (; m < (CLVOL_HAS_MANY_MEDIA ? scene->render->media : 1u); ++m, walked.leg = 0, walked.t = from) {
         Span span;
-        if (!medium_part(scene, m, ray, inside, from, to, &span))
+        if (!medium_part(scene, m, ray, inside, walked.t, to, &span))
             continue;
-        const uint4 k = decision_block(scene, key, BLOCK_SHADOW, walk_number(scene, stretch, (int)m));
+        const uint4 block = decision_block(scene, key, BLOCK_SHADOW, walk_number(scene, stretch, (int)m));
         Ray start = ray;
         start.o = span_point(&span, ray);
         const MediumRay in = part_ray(scene, inside, (int)m, start, span.end - span.start, channel);
-        *transmittance *= medium_transmittance(&in, k, tally);
-        if (extinction_max(*transmittance) == 0.0f)
+        *transmittance *= medium_transmittance(&in, leg_block(block, walked.leg), tally);
+        if (extinction_max(*transmittance) == 0.0f) {
+            tally->stopped = 0;
             return false;
+        }
+#if CLVOL_HAS_HETEROGENEOUS
+        if (goes_on(walked, tally)) {
+            set_shadow_walked(scene, slot, walk_on(walked, span_t(&span), tally->stop_t));
+#if CLVOL_HAS_MANY_MEDIA
+            set_path_shadow_medium(scene, slot, m);
+#endif
+            return false;
+        }
+#endif
     }
     return true;
 }
@@ -81,27 +105,53 @@ INLINE Target shadow_target(const Scene *scene, uint slot, Ray ray, float reach)
 }
 #endif
 
-/* What share of the light arrives: walks from surface to surface, up to the first that is opaque. */
+#if CLVOL_HAS_PASSABLE
+/* Surfaces that the shadow ray has passed, and the last of them. */
+typedef struct {
+    uint count;
+    Hit last;
+} Passed;
+
+INLINE Passed shadow_passed(const Scene *scene, uint slot)
+{
+    Passed passed = {0, {0.0f, 0.0f, 0.0f, NO_PRIMITIVE}};
+#if CLVOL_HAS_HETEROGENEOUS
+    if (path_shadow_leg(scene, slot) > 0) {
+        passed.count = path_shadow_stretch(scene, slot);
+        passed.last.t = path_shadow_after_t(scene, slot);
+        passed.last.primitive = path_shadow_after_primitive(scene, slot);
+    }
+#endif
+    return passed;
+}
+
+INLINE void set_shadow_passed(const Scene *scene, uint slot, const Passed *passed)
+{
+#if CLVOL_HAS_HETEROGENEOUS
+    set_path_shadow_stretch(scene, slot, passed->count);
+    set_path_shadow_after_t(scene, slot, passed->last.t);
+    set_path_shadow_after_primitive(scene, slot, passed->last.primitive);
+#endif
+}
+
+/* What share of the light arrives: walks from surface to surface, up to the first that is opaque.  Where a walk stops
+   short, the share up to there. */
 INLINE Spectrum shadow_share(const Scene *scene, uint slot, Tally *tally)
 {
     const Ray ray = shadow_ray(scene, slot);
     const float reach = shadow_reach(scene, slot);
     const int channel = (int)path_channel_or_zero(scene, slot);
     Spectrum share = (Spectrum)(1.0f);
-    Extinction transmittance = (Extinction)(1.0f);
 #if CLVOL_HAS_MEDIA
     const SampleKey key = path_key(scene, slot);
-    Inside inside = get_shadow_inside(scene, slot);
-#else
-    Inside inside;
+    Extinction transmittance = (Extinction)(1.0f);
 #endif
-#if CLVOL_HAS_PASSABLE
+    Inside inside = get_shadow_inside(scene, slot);
     const Target target = shadow_target(scene, slot, ray, reach);
-    Hit hit = {0.0f, 0.0f, 0.0f, NO_PRIMITIVE};
-    for (uint stretch = 0; stretch < MOST_PASSED; ++stretch) {
-        const float from = hit.t;
-        hit = closest_hit(scene, ray, hit.t, hit.primitive, reach);
+    for (Passed passed = shadow_passed(scene, slot); passed.count < MOST_PASSED; ++passed.count) {
+        Hit hit = closest_hit(scene, ray, passed.last.t, passed.last.primitive, reach);
         const bool last = hit.primitive == NO_PRIMITIVE || is_target(&hit, &target);
+        Spectrum through = (Spectrum)(1.0f);
         Surface surface;
         if (!last) {
             surface = hit_surface(scene, ray, &hit);
@@ -109,42 +159,71 @@ INLINE Spectrum shadow_share(const Scene *scene, uint slot, Tally *tally)
             Side side;
             if (!side_of(scene, scene->shapes + surface.shape, wi, &side))
                 return (Spectrum)(0.0f);
-            share *= null_transmission(scene, side.material, surface.uv, wi.z, channel);
-            if (!(spectrum_max(share) > 0.0f))
-                return share;
+            through = null_transmission(scene, side.material, surface.uv, wi.z, channel);
+            if (!(spectrum_max(share * through) > 0.0f))
+                return share * through;
         }
 #if CLVOL_HAS_MEDIA
-        if (!media_transmittance(scene, key, ray, &inside, stretch, from, last ? reach : hit.t, channel, tally,
-                                 &transmittance))
-            return (Spectrum)(0.0f);
-#endif
+        if (!media_transmittance(scene, slot, key, ray, &inside, passed.count, passed.last.t, last ? reach : hit.t,
+                                 channel, tally, &transmittance)) {
+            if (!tally->stopped)
+                return (Spectrum)(0.0f);
+            set_shadow_passed(scene, slot, &passed);
+            set_shadow_inside(scene, slot, inside);
+            return share * transmittance;
+        }
         if (last)
             return share * transmittance;
+#else
+        if (last)
+            return share;
+#endif
+        share *= through;
         cross_boundary(scene->shapes + surface.shape, surface.ng, ray.d, &inside);
+        passed.last = hit;
     }
     set_path_exhausted(scene, slot, path_exhausted(scene, slot) + 1);
     return (Spectrum)(0.0f);
+}
 #else
+/* What share of the light arrives, or, where a walk stops short, comes so far. */
+INLINE Spectrum shadow_share(const Scene *scene, uint slot, Tally *tally)
+{
+    const Ray ray = shadow_ray(scene, slot);
+    const float reach = shadow_reach(scene, slot);
 #if CLVOL_HAS_SURFACES
     const Target target = shadow_target(scene, slot, ray, reach);
     if (any_hit(scene, ray, reach, &target))
         return (Spectrum)(0.0f);
 #endif
+    Spectrum share = (Spectrum)(1.0f);
 #if CLVOL_HAS_MEDIA
-    media_transmittance(scene, key, ray, &inside, 0, 0.0f, reach, channel, tally, &transmittance);
+    Inside inside = get_shadow_inside(scene, slot);
+    Extinction transmittance = (Extinction)(1.0f);
+    media_transmittance(scene, slot, path_key(scene, slot), ray, &inside, 0, 0.0f, reach,
+                        (int)path_channel_or_zero(scene, slot), tally, &transmittance);
+    share *= transmittance;
 #endif
-    return share * transmittance;
-#endif
+    return share;
 }
+#endif
 
-INLINE void shadow_transmittance(const Scene *scene, uint group, uint slot)
+/* Returns the steps that the walks took. */
+INLINE uint shadow_transmittance(const Scene *scene, uint group, uint slot)
 {
     Tally tally = {0, 0, 0, 0, 0, 0, 0.0f};
     const Spectrum share = shadow_share(scene, slot, &tally);
 #if CLVOL_HAS_MEDIA
     record_tally(scene, slot, tally);
 #endif
-    set_radiance(scene, slot, get_radiance(scene, slot) + get_shadow(scene, slot) * share);
+    if (tally.stopped) {
+        set_shadow(scene, slot, get_shadow(scene, slot) * share);
+        queue_push(scene, group, QUEUE_SHADE, slot);
+    } else {
+        set_radiance(scene, slot, get_radiance(scene, slot) + get_shadow(scene, slot) * share);
+        queue_push(scene, group, path_next(scene, slot), slot);
+    }
+    return steps_of(&tally);
 }
 
 #endif

@@ -3,7 +3,8 @@
    Media that overlap compete as independent processes: a walk ends at the nearest collision found so far, and the
    nearest of all wins.  Weights are those of every walk up to that collision (METHODS §6): the walks that went
    beyond it before it was known are repeated, with the same random numbers, only as far.  In the mean, the walk
-   that collides contributes sigma_t T of its medium and each of the others its T. */
+   that collides contributes sigma_t T of its medium and each of the others its T.  A walk that stops
+   short of its end counts as if it had collided there; if that is the nearest, all go on from there. */
 #ifndef CLVOL_STAGES_STRETCH_SAMPLE_H
 #define CLVOL_STAGES_STRETCH_SAMPLE_H
 
@@ -21,13 +22,15 @@ INLINE Spectrum weight_ratio(Spectrum after, Spectrum before)
 /* Weights multiply, each walk's taken from what the path weighed before all of them. */
 #define JOINT_WEIGHTS (CLVOL_WEIGHTED && CLVOL_HAS_OVERLAP)
 
-INLINE void medium_sample(const Scene *scene, uint group, uint slot)
+/* Returns the steps that the walks took. */
+INLINE uint medium_sample(const Scene *scene, uint group, uint slot)
 {
     const SampleKey key = path_key(scene, slot);
     const Ray ray = path_ray(scene, slot);
     const Inside inside = get_inside(scene, slot);
     const uint stretch = path_stretch_or_zero(scene, slot);
-    const float from = path_after(scene, slot), to = stretch_end(scene, slot, ray);
+    const Walked walked = get_walked(scene, slot, path_after(scene, slot));
+    const float from = walked.t, to = stretch_end(scene, slot, ray);
     const Spectrum before = get_beta(scene, slot);
     Tally tally = {0, 0, 0, 0, 0, 0, 0.0f};
     Collision collision;
@@ -37,6 +40,8 @@ INLINE void medium_sample(const Scene *scene, uint group, uint slot)
     float reach = to;
     float3 end = ray.o;
     int winner = -1;
+    bool stopped = false; /* the winner, rather than collided */
+    Walked reached = walked;
     for (int pass = 0; pass < (JOINT_WEIGHTS ? 2 : 1); ++pass) {
         if (pass == 1) {
             if (winner < 0)
@@ -52,14 +57,19 @@ INLINE void medium_sample(const Scene *scene, uint group, uint slot)
             const float length = min_of(part.span.end - part.span.start, reach - part.start);
             const MediumRay in =
                 part_ray(scene, &inside, part.medium, start, length, (int)path_channel_or_zero(scene, slot));
-            const uint4 k = decision_block(scene, key, BLOCK_WALK, walk_number(scene, stretch, part.medium));
+            const uint4 k = leg_block(
+                decision_block(scene, key, BLOCK_WALK, walk_number(scene, stretch, part.medium)), walked.leg);
             collision.beta = JOINT_WEIGHTS ? before : beta;
             const bool collided = medium_collision(&in, k, &tally, &collision);
             beta = JOINT_WEIGHTS ? beta * weight_ratio(collision.beta, before) : collision.beta;
-            if (collided && pass == 0) {
+            const bool stops = goes_on(walked, &tally);
+            if ((collided || stops) && pass == 0) {
                 winner = part.medium;
                 winning = collision.beta;
-                limit = reach = part.start + collision.t;
+                stopped = stops;
+                if (stopped)
+                    reached = walk_on(walked, part.start, tally.stop_t);
+                limit = reach = stopped ? reached.t : part.start + collision.t;
                 end = CLVOL_HAS_THIN ? start.o + collision.t * ray.d : ray.o + reach * ray.d;
                 if (!CLVOL_HAS_OVERLAP)
                     break;
@@ -72,7 +82,10 @@ INLINE void medium_sample(const Scene *scene, uint group, uint slot)
         subtract_background(scene, slot, scene->media + first.medium, (int)path_channel_or_zero(scene, slot), beta);
 #endif
     record_walk(scene, slot, tally, beta, collision.emission);
-    if (winner >= 0) {
+    if (stopped) {
+        set_walked(scene, slot, reached);
+        set_path_event(scene, slot, EVENT_WALK);
+    } else if (winner >= 0) {
 #if CLVOL_HAS_MANY_MEDIA
         set_path_medium(scene, slot, winner);
 #endif
@@ -80,6 +93,7 @@ INLINE void medium_sample(const Scene *scene, uint group, uint slot)
         set_path_event(scene, slot, EVENT_COLLISION);
     }
     queue_push(scene, group, QUEUE_SHADE, slot);
+    return steps_of(&tally);
 }
 
 #endif

@@ -8,7 +8,7 @@ typedef struct {
     MajorantWalk walk;
     Stretch stretch;
     float depth; /* still to go; the tracker draws it anew at each tentative collision */
-    uint budget;
+    uint steps;  /* still allowed */
 } Flight;
 
 INLINE Flight flight_begin(const MediumRay *in, uint first)
@@ -17,22 +17,22 @@ INLINE Flight flight_begin(const MediumRay *in, uint first)
     flight.walk = majorant_begin(in);
     flight.stretch = stretch_of(in, 0.0f, 0.0f, 0.0f); /* empty: the first cell is still to be entered */
     flight.depth = exponential_variate(first);
-    flight.budget = WALK_BUDGET;
+    flight.steps = WALK_STEPS;
     return flight;
 }
 
-/* Moves on to the next tentative collision; false at the end of the ray, or of the budget. */
+/* Moves on to the next tentative collision; false at the end of the ray, or where the walk stops short. */
 INLINE bool flight_next(const MediumRay *in, Flight *flight, Tally *tally)
 {
+    if (flight->steps-- == 0) {
+        stop_walk(stretch_t(&flight->stretch), tally);
+        return false;
+    }
     while (!next_tentative(&flight->stretch, &flight->depth, tally)) {
         if (!majorant_next(in, &flight->walk))
             return false;
         flight->stretch = stretch_of(in, flight->walk.t, flight->walk.t_end, flight->walk.majorant);
         tally->cells += 1;
-    }
-    if (flight->budget-- == 0) {
-        tally->exhausted += 1;
-        return false;
     }
     return true;
 }

@@ -8,13 +8,19 @@
    numbered dimension of the first distance; everything later comes from the stream.
 
    sample_collision returns whether the ray collided; `collision->beta`, the path's whole weight, is
-   multiplied by the walk's weight either way, and `collision->emission` gathers the light met on the way. */
+   multiplied by the walk's weight either way, and `collision->emission` gathers the light met on the way.
+
+   Both may stop short, with stop_walk(): what they return then holds up to there, with no collision so far. */
 #ifndef CLVOL_TRACKING_INTERFACE_H
 #define CLVOL_TRACKING_INTERFACE_H
 #include "tracking/tally.h"
 
-/* Look-ups of one walk before it is given up and counted: no loop in a kernel is without a bound. */
-#define WALK_BUDGET (1u << 26)
+/* A walk goes in legs, so that no launch takes long: after WALK_STEPS steps it stops where it is, and another walk
+   goes on from there in the next wave.  Nothing is kept but its place and the path's weight, since a free flight
+   has no memory: any point that it reached without a collision is as good a start as the first.  After WALK_LEGS
+   legs it is given up and counted: no loop is without a bound. */
+#define WALK_STEPS (1u << 14)
+#define WALK_LEGS (1u << 12)
 
 /* The stretch 0 <= t <= t_max of a ray that lies in one medium, t in world lengths. */
 typedef struct {
@@ -27,5 +33,20 @@ typedef struct {
     Extinction scale; /* sigma_t = scale * density; the coefficient itself where it is constant */
     float rate;       /* majorant = rate * bound */
 } MediumRay;
+
+INLINE void stop_walk(float t, Tally *tally)
+{
+    tally->stopped = 1;
+    tally->stop_t = t;
+}
+
+/* What is left of a ray from t on. */
+INLINE MediumRay rest_of_ray(MediumRay in, float t)
+{
+    in.ray.o += t * in.ray.d;
+    in.world.o += t * in.world.d;
+    in.t_max -= t;
+    return in;
+}
 
 #endif

@@ -7,7 +7,7 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
 {
     float depth = exponential_variate(first);
     const float jitter = uniform_float(stream_pair(stream).x), step = in->medium->march_step;
-    for (uint i = 0; i < WALK_BUDGET; ++i) {
+    for (uint i = 0; i < WALK_STEPS; ++i) {
         const float t = (float)i * step;
         if (!(t < in->t_max))
             return false;
@@ -21,6 +21,6 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
         }
         depth -= sigma_t * length;
     }
-    tally->exhausted += 1;
+    stop_walk((float)WALK_STEPS * step, tally);
     return false;
 }

@@ -5,13 +5,13 @@ INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream
 {
     Extinction depth = (Extinction)(0.0f);
     const float jitter = uniform_float(first), step = in->medium->march_step;
-    for (uint i = 0; i < WALK_BUDGET; ++i) {
+    for (uint i = 0; i < WALK_STEPS; ++i) {
         const float t = (float)i * step;
         if (!(t < in->t_max))
             return exp_of_minus(depth);
         const float length = min_of(step, in->t_max - t);
         depth += length * extinction_at(in, in->ray.o + (t + jitter * length) * in->ray.d, stream, tally);
     }
-    tally->exhausted += 1;
-    return (Extinction)(0.0f);
+    stop_walk((float)WALK_STEPS * step, tally);
+    return exp_of_minus(depth);
 }

@@ -10,8 +10,10 @@
    alike, and cost more than they tell. */
 #define COMB_DENSITY 1.0f
 #define COMB_MOST 1e4f
-/* A series whose order reaches this is given up and counted; its terms have long been nothing. */
+/* A series whose order reaches this, or that has taken so many look-ups, is given up and counted: terms have long been
+   nothing by then, or have grown beyond what cancels in floats. */
 #define SERIES_BUDGET 4096
+#define SERIES_LOOKUPS (1u << 18)
 
 /* Combs longer than LONG_COMB are worth a short one first: where that finds the medium thick, roulette
    spares most of the long ones.  Survivors weigh at most 1 / LEAST_SURVIVAL more. */
@@ -65,10 +67,11 @@ INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream
     const float teeth = min_of(1.0f + COMB_DENSITY * whole, COMB_MOST); /* a fraction of one is fine */
     const bool is_long = teeth > LONG_COMB;
     Extinction pivot = (Extinction)(0.0f), sum = (Extinction)(0.0f), term = (Extinction)(0.0f);
+    const uint before = tally->lookups;
     float weight = 1.0f;
     uint k = first;
     /* order -1 (of long combs): roulette; 0: the pivot; 1 and more: terms */
-    for (int order = is_long ? -1 : 0; order < SERIES_BUDGET; ++order) {
+    for (int order = is_long ? -1 : 0; order < SERIES_BUDGET && tally->lookups - before < SERIES_LOOKUPS; ++order) {
         const float step = whole / (order < 0 ? SHORT_COMB : teeth);
         const Extinction tau = comb_estimate(in, uniform_float(k) * step, step, stream, tally);
         const uint2 next = stream_pair(stream);

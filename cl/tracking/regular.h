@@ -89,7 +89,7 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
     const int channel = pick_channel(collision->beta, stream_pair(stream));
     Extinction depth = (Extinction)(0.0f);
     Track track = {0.0f, 0.0f, 0.0f, 0.0f, (Extinction)(0.0f)};
-    uint budget = WALK_BUDGET;
+    uint steps = WALK_STEPS;
     MajorantWalk walk = majorant_begin(in);
     while (majorant_next(in, &walk)) {
         tally->cells += 1;
@@ -119,11 +119,13 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
             if (is_tracked(depth + part))
                 track_add(&track, walk.t + piece.t, piece.t_end - piece.t, depth, part, stream);
             depth += part;
-            if (--budget == 0) {
-                tally->exhausted += 1;
-                return false;
+            if (--steps == 0) {
+                stop_walk(walk.t + piece.t_end, tally);
+                break;
             }
         }
+        if (steps == 0)
+            break;
     }
     gather_track(in, &track, stream, tally, collision);
     collision->beta = balanced(collision->beta, (Extinction)(1.0f), depth);

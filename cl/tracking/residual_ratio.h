@@ -21,7 +21,7 @@ INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream
 {
     Extinction transmittance = (Extinction)(1.0f), control_depth = (Extinction)(0.0f);
     float depth = exponential_variate(first);
-    uint budget = WALK_BUDGET;
+    uint steps = WALK_STEPS;
     MajorantWalk walk = majorant_begin(in);
     while (majorant_next(in, &walk)) {
         __global const float *row = cell_row(in, in->scene->residuals, walk.cell, 1);
@@ -39,9 +39,9 @@ INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream
             if (!transmittance_survives(&transmittance, k.x))
                 return (Extinction)(0.0f);
             RECORD_ESTIMATE(stretch_t(&stretch), transmittance * exp_of_minus(control_depth), tally);
-            if (--budget == 0) {
-                tally->exhausted += 1;
-                return (Extinction)(0.0f);
+            if (--steps == 0) {
+                stop_walk(stretch_t(&stretch), tally);
+                return transmittance * exp_of_minus(control_depth);
             }
             depth = exponential_variate(k.y);
         }

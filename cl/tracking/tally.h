@@ -8,8 +8,10 @@ typedef struct {
     uint real;       /* real collisions */
     uint cells;      /* majorant cells crossed */
     uint violations; /* look-ups above their majorant */
-    uint exhausted;  /* walks that used up WALK_BUDGET */
+    uint exhausted;  /* walks that used up their bound */
     float weight;    /* largest absolute weight on the way, of techniques that change it */
+    uint stopped;    /* 1: the last walk used up its steps, and is to go on from stop_t */
+    float stop_t;
 } Tally;
 
 #endif

@@ -23,10 +23,16 @@ INLINE bool is_thin(const MediumRay *in)
     return global_rate(in) * in->t_max <= THIN_DEPTH;
 }
 
-/* `first` places the point: it may also decide the flight, since sums keep their mean whatever they share. */
+/* `first` places the point, */
+INLINE float thin_point(const MediumRay *in, uint first)
+{
+    return uniform_float(first) * in->t_max;
+}
+
+/* and gathers its emission.  It may also decide the flight, since sums keep their mean whatever they share. */
 INLINE Spectrum thin_emission(const MediumRay *in, uint first, Stream *stream, Tally *tally, Spectrum beta)
 {
-    const float rate = global_rate(in), t = uniform_float(first) * in->t_max;
+    const float rate = global_rate(in), t = thin_point(in, first);
     if (!(rate > 0.0f))
         return (Spectrum)(0.0f);
     float at = exponential_variate(stream_pair(stream).x) / rate;
