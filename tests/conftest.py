@@ -1,6 +1,7 @@
 """Fixtures every test may use: the device under test, and where the real volumes are."""
 
 import os
+import re
 import signal
 from pathlib import Path
 
@@ -54,6 +55,25 @@ def independent_samples():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(choices, "DEFAULT_SAMPLER", "independent")
         yield
+
+
+@pytest.fixture
+def bounds(monkeypatch):
+    """Compiles other bounds into the kernels, as WALK_STEPS=3."""
+    from clvol import programs
+
+    compose = programs.compose
+
+    def set_to(**counts):
+        def with_bounds(*arguments):
+            text = compose(*arguments)
+            for name, count in counts.items():
+                text = re.sub(rf"#define {name} \(.*\)", f"#define {name} {count}u", text)
+            return text
+
+        monkeypatch.setattr(programs, "compose", with_bounds)
+
+    return set_to
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ import pytest
 from stat_tests import assert_same_picture
 
 import clvol
-from clvol import programs, wavefront
+from clvol import wavefront
 from clvol.choices import Choices
 from clvol.session import Session
 
@@ -91,24 +91,6 @@ def digest(result):
     return hashlib.sha256(result.image.tobytes() + result.variance.tobytes()).hexdigest()
 
 
-@pytest.fixture
-def bounds(monkeypatch):
-    """Compiles other bounds into the kernels."""
-
-    def set_to(**steps):
-        original = programs.compose
-
-        def compose(*arguments):
-            text = original(*arguments)
-            for name, count in steps.items():
-                text = text.replace(f"#define {name} (1u << 14)", f"#define {name} {count}u")
-            return text
-
-        monkeypatch.setattr(programs, "compose", compose)
-
-    return set_to
-
-
 @pytest.mark.parametrize(("kind", "technique", "transmittance"), CASES)
 def test_walks_in_short_legs_give_the_same_picture(bounds, kind, technique, transmittance):
     """Three steps a leg, so that nearly every walk of path and shadow ray goes on in later waves."""
@@ -129,14 +111,8 @@ def test_legs_do_not_depend_on_how_waves_are_cut(bounds):
     assert digest(clvol.render(scene, spp=64, seed=1)) == digest(whole)
 
 
-def test_a_walk_is_given_up_after_its_last_leg(bounds, monkeypatch):
-    original = programs.compose
-    monkeypatch.setattr(
-        programs,
-        "compose",
-        lambda *a: original(*a).replace("#define WALK_LEGS (1u << 12)", "#define WALK_LEGS 4u"),
-    )
-    bounds(WALK_STEPS=2)
+def test_a_walk_is_given_up_after_its_last_leg(bounds):
+    bounds(WALK_STEPS=2, WALK_LEGS=4)
     result = clvol.render(scene_of("lumps"), spp=8, majorant_scale=20.0)
     assert result.stats["walks_exhausted"] > 0
 

@@ -43,8 +43,7 @@ SLAB = {
 DISK = {"type": "disk", "to_world": clvol.translate([0, 0, -2]) @ clvol.scale(0.5)}
 
 
-@pytest.fixture(scope="module")
-def view():
+def lumpy():
     """A lumpy grey medium, seen through the middle of the picture."""
     return clvol.trace_ray(
         scene_of(medium_of(tinted(), 3.0, 0.5)),
@@ -56,6 +55,11 @@ def view():
         many=MANY,
         seed=5,
     )
+
+
+@pytest.fixture(scope="module")
+def view():
+    return lumpy()
 
 
 @pytest.fixture(scope="module")
@@ -168,8 +172,19 @@ def free_path_z(view, one, density_scale=1.0):
 
 
 def test_free_paths_and_transmittances_are_exact_in_the_mean(view, chromatic):
+    assert_exact_in_the_mean(view, chromatic)
+
+
+def test_walks_of_many_legs_are_exact_in_the_mean(bounds):
+    bounds(WALK_STEPS=3)
+    cut = lumpy()
+    assert_exact_in_the_mean(cut)
+    test_running_estimates_begin_at_1_and_end_at_the_walks_own(cut)
+
+
+def assert_exact_in_the_mean(*views):
     """All z-scores together have the false-alarm rate of `stat_tests`, and a density 20 % off is caught."""
-    comparisons = [(shown, one) for shown in (view, chromatic) for one in shown.watched]
+    comparisons = [(shown, one) for shown in views for one in shown.watched]
     bound = largest_z(21 * len(comparisons))
     for shown, one in comparisons:
         if one.family == "technique":

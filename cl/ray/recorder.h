@@ -18,6 +18,8 @@ typedef struct {
     __global float *log;
     uint events;   /* that happened */
     uint capacity; /* of the log: later ones are only counted */
+    float begun;   /* where on the ray the walk's leg began */
+    float3 share;  /* the estimate up to there */
 } Recorder;
 
 INLINE void record_event(Tally *tally, int kind, float t, float3 value)
@@ -26,7 +28,7 @@ INLINE void record_event(Tally *tally, int kind, float t, float3 value)
     if (recorder->events < recorder->capacity) {
         __global float *event = recorder->log + recorder->events * EVENT_SIZE;
         event[0] = (float)kind;
-        event[1] = t;
+        event[1] = recorder->begun + t;
         vstore3(value, 0, event + 2);
     }
     recorder->events += 1;
@@ -40,6 +42,6 @@ INLINE void record_event(Tally *tally, int kind, float t, float3 value)
 #define RECORD_LOOKUP(in, p, sigma_t, tally) record_event(tally, EVENT_LOOKUP, PARAMETER_OF(in, p), (float3)(sigma_t))
 #define RECORD_NULL(beta, tally) record_event(tally, EVENT_NULL, 0.0f, (float3)(beta))
 #define RECORD_REAL(t, beta, tally) record_event(tally, EVENT_REAL, t, (float3)(beta))
-#define RECORD_ESTIMATE(t, estimate, tally) record_event(tally, EVENT_ESTIMATE, t, (float3)(estimate))
+#define RECORD_ESTIMATE(t, estimate, tally) record_event(tally, EVENT_ESTIMATE, t, ((Recorder *)(tally))->share * (float3)(estimate))
 
 #endif

@@ -4,6 +4,32 @@
 #include "ray/given.h"
 
 #define OUTCOME_SIZE 9u
+/* Legs of a walk, all in one launch, before it is given up and counted. */
+#define MOST_LEGS 64u
+
+#ifdef COLLISIONS
+INLINE bool walk(const MediumRay *in, uint first, Stream *stream, Tally *tally, Collision *collision)
+{
+#if CLVOL_HAS_HOMOGENEOUS
+    if (is_homogeneous(in->medium))
+        return homogeneous_collision(in, first, stream, tally, collision);
+#endif
+#if CLVOL_HAS_HETEROGENEOUS
+    return sample_collision(in, first, stream, tally, collision);
+#endif
+}
+#else
+INLINE Extinction walk(const MediumRay *in, uint first, Stream *stream, Tally *tally)
+{
+#if CLVOL_HAS_HOMOGENEOUS
+    if (is_homogeneous(in->medium))
+        return homogeneous_transmittance(in);
+#endif
+#if CLVOL_HAS_HETEROGENEOUS
+    return estimate_transmittance(in, first, stream, tally);
+#endif
+}
+#endif
 
 __kernel void walks(CLVOL_ARGUMENTS, __global const float *given, __global float *outcomes, __global float *log,
                     uint2 seed, uint walks, uint recorded, uint capacity)
@@ -12,43 +38,41 @@ __kernel void walks(CLVOL_ARGUMENTS, __global const float *given, __global float
     const uint i = get_global_id(0);
     if (i >= walks)
         return;
-    const MediumRay in = given_ray(&scene, given);
+    MediumRay in = given_ray(&scene, given);
     const uint4 k = philox4x32((uint4)(i, 0, 0, 0), seed);
     Stream stream = stream_begin(k.z, k.w);
-    Recorder recorder = {{0, 0, 0, 0, 0, 0, 0.0f}, log + i * capacity * EVENT_SIZE, 0, i < recorded ? capacity : 0};
+    Recorder recorder = {{0, 0, 0, 0, 0, 0, 0.0f}, log + i * capacity * EVENT_SIZE, 0, i < recorded ? capacity : 0, 0.0f,
+                         (float3)(1.0f)};
     Tally *tally = &recorder.tally;
+    uint first = k.x;
     float t = -1.0f;
 #ifdef COLLISIONS
     Collision collision;
-    collision.t = -1.0f;
     collision.beta = (Spectrum)(1.0f);
     collision.emission = (Spectrum)(0.0f);
-    bool collided;
-#if CLVOL_HAS_HOMOGENEOUS
-    if (is_homogeneous(in.medium))
-        collided = homogeneous_collision(&in, k.x, &stream, tally, &collision);
-#if CLVOL_HAS_HETEROGENEOUS
-    else
 #endif
+    for (uint leg = 0; leg == 0 || tally->stopped; ++leg) {
+        if (leg == MOST_LEGS) {
+            tally->exhausted += 1;
+            break;
+        }
+        if (leg > 0) {
+            in = rest_of_ray(in, tally->stop_t);
+            recorder.begun += tally->stop_t;
+            tally->stopped = 0;
+            first = stream_pair(&stream).x;
+        }
+#ifdef COLLISIONS
+        if (walk(&in, first, &stream, tally, &collision))
+            t = recorder.begun + collision.t;
+#else
+        recorder.share *= (float3)(walk(&in, first, &stream, tally));
 #endif
-#if CLVOL_HAS_HETEROGENEOUS
-        collided = sample_collision(&in, k.x, &stream, tally, &collision);
-#endif
-    t = collided ? collision.t : -1.0f;
+    }
+#ifdef COLLISIONS
     const float3 value = (float3)(collision.beta);
 #else
-    Extinction estimate;
-#if CLVOL_HAS_HOMOGENEOUS
-    if (is_homogeneous(in.medium))
-        estimate = homogeneous_transmittance(&in);
-#if CLVOL_HAS_HETEROGENEOUS
-    else
-#endif
-#endif
-#if CLVOL_HAS_HETEROGENEOUS
-        estimate = estimate_transmittance(&in, k.x, &stream, tally);
-#endif
-    const float3 value = (float3)(estimate);
+    const float3 value = recorder.share;
 #endif
     __global float *outcome = outcomes + i * OUTCOME_SIZE;
     outcome[0] = t;
