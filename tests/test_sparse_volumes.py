@@ -37,17 +37,22 @@ GRIDS = {
 }
 
 
+def force_trees(monkeypatch):
+    """Every sparse grid's top grid is a tree, built without arrays over its box, however small."""
+    monkeypatch.setattr("clvol.volumes.bricks.is_scattered", lambda shape, places: True)
+    monkeypatch.setattr("clvol.volumes.sparse_places.TABLE_PLACES", 0)
+
+
 @pytest.fixture
 def trees(monkeypatch):
-    """Every sparse grid's top grid is a tree, however small."""
-    monkeypatch.setattr("clvol.volumes.bricks.is_scattered", lambda shape, places: True)
+    force_trees(monkeypatch)
 
 
 def both(grid, monkeypatch):
     """The same grid under a dense top grid and under a tree."""
     dense = build_bricks(grid)
     with monkeypatch.context() as forced:
-        forced.setattr("clvol.volumes.bricks.is_scattered", lambda shape, places: True)
+        force_trees(forced)
         tree = build_bricks(grid)
     assert isinstance(dense, BrickMap) and isinstance(tree, BrickTree)
     return dense, tree
@@ -169,7 +174,7 @@ def test_look_ups_through_a_tree_have_the_same_bits(device, monkeypatch):
     found = []
     for forced in (False, True):
         if forced:
-            monkeypatch.setattr("clvol.volumes.bricks.is_scattered", lambda shape, places: True)
+            force_trees(monkeypatch)
         probe = Probe(device, scene_of(medium), lookup="stochastic", majorant="global")
         assert probe.config.top_trees == forced
         out = [np.empty(len(points), np.float32) for _ in range(3)]
@@ -193,7 +198,7 @@ def test_a_picture_through_trees_has_the_same_bits(monkeypatch):
     pictures = []
     for forced in (False, True):
         if forced:
-            monkeypatch.setattr("clvol.volumes.bricks.is_scattered", lambda shape, places: True)
+            force_trees(monkeypatch)
         result = clvol.render(scene_of(medium), spp=4, seed=3, majorant="global", transmittance="ratio")
         pictures.append(result.image)
     assert (pictures[0] == pictures[1]).all() and pictures[0].std() > 0.01
@@ -309,6 +314,13 @@ def test_far_leaves_attenuate_and_the_space_between_them_is_crossed_in_few_steps
 def test_a_box_that_floats_cannot_place_is_refused():
     with pytest.raises(clvol.VolumeError, match=f"more than the limit of {MOST_EXTENT}"):
         build_bricks(far_pair(MOST_EXTENT))
+
+
+def test_more_bricks_than_the_limit_are_refused_before_they_are_bounded(monkeypatch):
+    monkeypatch.setattr("clvol.volumes.sparse_places.MOST_PLACES", 1000)
+    build_bricks(trail(100, 1000))
+    with pytest.raises(clvol.VolumeError, match="more than 1000 bricks"):
+        build_bricks(trail(126, 1000))
 
 
 def test_compact_and_filled_grids_keep_their_arrays():

@@ -1,4 +1,4 @@
-"""What stands at the brick places of a sparse grid, found by sorted keys: no array over its box."""
+"""What stands at the brick places of a sparse grid, found by sorted keys: no array over a large box."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from clvol.volumes.tree import keys, rows_of, unique_places
 BRICK_CELLS = 8
 MOST_PLACES = 1 << 24
 """Bricks that a sparse grid may need: they would take 49 GB."""
+TABLE_PLACES = 1 << 18
+"""Where a box has no more places than this, a table of all of them is faster than sorted keys."""
 _CHUNK_PLACES = 1 << 18
 _CORNERS = np.array(list(np.ndindex(2, 2, 2)))
 
@@ -34,6 +36,7 @@ class SparsePlaces:
         order = np.argsort(keys(at[inside]), kind="stable")
         self.leaf_places, self._leaf_rows = at[inside[order]], inside[order]
         self._leaf_keys = keys(self.leaf_places)
+        self._table = self._leaf_table() if np.prod(np.array(shape) + 1) <= TABLE_PLACES else None
         self._tiles = [self._tiles_of(grid, int(edge)) for edge in np.unique(grid.tile_sizes)]
 
     def _holds(self, places: np.ndarray) -> np.ndarray:
@@ -49,8 +52,16 @@ class SparsePlaces:
         order = np.argsort(key)
         return edge, start[inside][order], key[order], grid.tile_values[own][inside][order]
 
+    def _leaf_table(self) -> np.ndarray:
+        """Number of the leaf, or -1, at all places of a small box."""
+        table = np.full(np.array(self.shape) + 1, -1, np.int32)
+        table[tuple(self.leaf_places.T)] = self._leaf_rows
+        return table
+
     def leaf(self, places: np.ndarray) -> np.ndarray:
         """Number of the leaf at each place, int (...), or -1."""
+        if self._table is not None:
+            return self._table[tuple(np.moveaxis(places, -1, 0))]
         if not len(self._leaf_rows):
             return np.full(places.shape[:-1], -1, np.intp)
         row = rows_of(self._leaf_keys, keys(places))
@@ -59,6 +70,8 @@ class SparsePlaces:
     def constant(self, places: np.ndarray) -> np.ndarray:
         """Value of the tile at each place, float32 (...), or the background; leaves are not looked at."""
         values = np.full(places.shape[:-1], self.background, np.float32)
+        if not self._tiles:
+            return values
         for edge, _, tile_keys, tile_values in self._tiles:
             # a place and its tile have the same cell of the lattice of that edge
             cell = (places * BRICK_CELLS + self._origin) // edge - self._origin // edge
@@ -71,12 +84,26 @@ class SparsePlaces:
 
         Raises VolumeError where they are more than MOST_PLACES.
         """
+        if self._table is not None:
+            return np.argwhere(self._changing_in_box(self._table))
         found, pending = np.empty((0, 3), np.int64), []
         for part in self._candidates():
             pending.append(part[self._meets(part)])
             if sum(map(len, pending)) > max(len(found), _CHUNK_PLACES):
                 found, pending = self._joined([found, *pending]), []
         return self._joined([found, *pending])
+
+    def _changing_in_box(self, table: np.ndarray) -> np.ndarray:
+        """The same as a bool for every place of a small box."""
+        constant = np.full(table.shape, self.background, np.float32)
+        if self._tiles:
+            constant = self.constant(np.stack(np.indices(table.shape), axis=-1))
+        nz, ny, nx = self.shape
+        changes, own = np.zeros(self.shape, bool), constant[:-1, :-1, :-1]
+        for z, y, x in _CORNERS:
+            cut = np.s_[z : z + nz, y : y + ny, x : x + nx]
+            changes |= (table[cut] >= 0) | (constant[cut] != own)
+        return changes
 
     def _joined(self, parts: list[np.ndarray]) -> np.ndarray:
         places, _ = unique_places(np.concatenate(parts))
