@@ -5,7 +5,7 @@
 
 #define OUTCOME_SIZE 9u
 /* Legs of a walk, all in one launch, before it is given up and counted. */
-#define MOST_LEGS 64u
+#define MOST_LEGS 256u
 
 #ifdef COLLISIONS
 INLINE bool walk(const MediumRay *in, uint first, Stream *stream, Tally *tally, Collision *collision)

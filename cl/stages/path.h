@@ -40,7 +40,7 @@ INLINE void queue_clear(const Scene *scene, uint group, uint queue)
 }
 
 /* Steps of a work-item beyond which it leaves the other slots to the next wave, so that no launch takes long. */
-#define STAGE_STEPS (1u << 14)
+#define STAGE_STEPS (1u << 13)
 
 INLINE uint steps_of(const Tally *tally)
 {

@@ -19,8 +19,8 @@
    goes on from there in the next wave.  Nothing is kept but its place and the path's weight, since a free flight
    has no memory: any point that it reached without a collision is as good a start as the first.  After WALK_LEGS
    legs it is given up and counted: no loop is without a bound. */
-#define WALK_STEPS (1u << 14)
-#define WALK_LEGS (1u << 12)
+#define WALK_STEPS (1u << 12)
+#define WALK_LEGS (1u << 14)
 
 /* The stretch 0 <= t <= t_max of a ray that lies in one medium, t in world lengths. */
 typedef struct {
