@@ -21,20 +21,17 @@ _CHUNK = 2**17
 
 @dataclass(frozen=True, eq=False)
 class RawMesh:
-    """A file's triangles: vertices (n, 3), integer faces (m, 3), normals (n, 3) and uvs (n, 2) or None."""
+    """A file's triangles: vertices (n, 3), integer faces (m, 3), normals (n, 3) and uvs (n, 2) or None.
+
+    without_uvs : bool (n,), the vertices that have no texture coordinates though others do; None: all have.
+    Normals of length 0 are worked out.
+    """
 
     vertices: np.ndarray
     faces: np.ndarray
     normals: np.ndarray | None = None
     uvs: np.ndarray | None = None
-
-
-def triangle_fans(vertices: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Triangles (0, k, k + 1) of polygons whose corners, as many as `sizes` says, lie in a row; (n, 3)."""
-    triangles = sizes - 2
-    start = np.repeat(np.cumsum(sizes) - sizes, triangles)
-    within = np.arange(len(start)) - np.repeat(np.cumsum(triangles) - triangles, triangles)
-    return np.stack([vertices[start], vertices[start + within + 1], vertices[start + within + 2]], axis=1)
+    without_uvs: np.ndarray | None = None
 
 
 def build_mesh(raw: RawMesh, source: str, smooth: bool) -> tuple[Mesh, np.ndarray]:

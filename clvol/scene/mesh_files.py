@@ -1,7 +1,8 @@
-"""Meshes from files: STL, glTF and most PLY through trimesh, the rest by `obj` and `ply`."""
+"""Meshes from files: STL and glTF through trimesh, the rest by `obj` and `ply`."""
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,10 @@ import numpy as np
 from clvol.files import other_kind
 from clvol.scene.mesh import RawMesh, build_mesh
 from clvol.scene.obj import read_obj
-from clvol.scene.ply import read_mixed_ply
+from clvol.scene.ply import read_ply
 from clvol.scene.records import Mesh
+
+log = logging.getLogger("clvol")
 
 FORMATS = ("obj", "ply", "stl", "glb", "gltf")
 _HINTS = {  # what trimesh says, and what it may mean
@@ -40,27 +43,29 @@ def read_mesh(
         raise ValueError(f"it cannot be read as {kind}: {reason}{hint}") from None
     if flip_tex_coords and raw.uvs is not None:
         raw.uvs[:, 1] = 1 - raw.uvs[:, 1]
+    if raw.without_uvs is not None:
+        raw.uvs[raw.without_uvs] = 0
+        bare = int(raw.without_uvs[raw.faces].any(axis=1).sum())
+        log.warning(
+            "%s: %d of %d triangles have no texture coordinates: they get (0, 0)", path, bare, len(raw.faces)
+        )
     return build_mesh(raw, str(path), smooth=not face_normals and kind != "stl")
 
 
 def _read(path: Path, kind: str) -> RawMesh:
     if kind == "obj":
         return read_obj(path.read_bytes())
-    try:
-        return _read_with_trimesh(path, kind)
-    except ValueError as error:
-        if "PLY is unexpected length" not in str(error):
-            raise
-        return read_mixed_ply(path.read_bytes())
+    if kind == "ply":
+        return read_ply(path.read_bytes())
+    return _read_with_trimesh(path, kind)
 
 
 def _read_with_trimesh(path: Path, kind: str) -> RawMesh:
     import trimesh  # takes half a second, which scenes without meshes are spared
 
     with np.errstate(all="ignore"):
-        # trimesh's repair of texture coordinates renumbers a ply's vertices, but not its normals
-        options = {"fix_texture": False} if kind == "ply" else {"resolver": _regular_files(path)}
-        loaded = trimesh.load(str(path), file_type=kind, process=False, maintain_order=True, **options)
+        options = {"process": False, "maintain_order": True, "resolver": _regular_files(path)}
+        loaded = trimesh.load(str(path), file_type=kind, **options)
     if isinstance(loaded, trimesh.Trimesh):
         return _raw(loaded, np.eye(4))
     parts = []
@@ -102,19 +107,21 @@ def _raw(mesh: object, to_world: np.ndarray) -> RawMesh:
 
 
 def _joined(parts: list[RawMesh]) -> RawMesh:
-    """Several meshes as one.  Normals that a part lacks are 0, so worked out later; so are its uvs."""
+    """Several meshes as one.  Normals that a part lacks are 0, so worked out later."""
     if not parts:
         raise ValueError("it has no triangles")
     if len(parts) == 1:
         return parts[0]
     first = np.cumsum([0, *(len(part.vertices) for part in parts)])
     has_normals = any(part.normals is not None for part in parts)
-    has_uvs = any(part.uvs is not None for part in parts)
+    bare = [part.uvs is None for part in parts]
+    has_uvs = not all(bare)
     return RawMesh(
         np.concatenate([part.vertices for part in parts]),
         np.concatenate([part.faces + at for part, at in zip(parts, first, strict=False)]),
         np.concatenate([_or_zeros(p.normals, p, 3) for p in parts]) if has_normals else None,
         np.concatenate([_or_zeros(p.uvs, p, 2) for p in parts]) if has_uvs else None,
+        np.repeat(bare, [len(p.vertices) for p in parts]) if has_uvs and any(bare) else None,
     )
 
 

@@ -6,20 +6,22 @@ a hard edge is one position with two normals.  trimesh keeps one of them, so OBJ
 
 from __future__ import annotations
 
+import codecs
 import warnings
 
 import numpy as np
 
-from clvol.scene.mesh import RawMesh, triangle_fans
+from clvol.scene.mesh import RawMesh
+from clvol.scene.polygons import distinct, triangulate
 
 _NONE = -1
 
 
 def read_obj(data: bytes) -> RawMesh:
-    """Positions, faces (polygons as fans of triangles), normals and texture coordinates of an OBJ file.
+    """Positions, faces (polygons as triangles), normals and texture coordinates of an OBJ file.
 
-    Groups, materials, smoothing groups, lines and points are skipped.  Normals and texture coordinates count
-    only where every corner names one; a vertex is one combination of the three indices, as in Mitsuba.
+    Groups, materials, smoothing groups, lines and points are skipped.  A vertex is one combination of the
+    three indices, as in Mitsuba.  Where some corners name a normal, those that do not get their face's.
 
     Raises
     ------
@@ -29,6 +31,7 @@ def read_obj(data: bytes) -> RawMesh:
     tables: dict[bytes, list[bytes]] = {b"v": [], b"vt": [], b"vn": []}
     faces: list[bytes] = []
     counts: list[tuple[int, ...]] = []  # rows of each table so far, which negative indices count back from
+    data = data.removeprefix(codecs.BOM_UTF8)
     for line in data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines():
         keyword, rest = (*line.split(None, 1), b"", b"")[:2]
         if keyword in tables:
@@ -49,7 +52,7 @@ def _numbers(rows: list[bytes], width: int) -> np.ndarray:
     """The first `width` numbers of each row, float64 (n, width); all rows hold equally many."""
     if not rows:
         return np.zeros((0, width))
-    values = _parse(b" ".join(rows), np.float64)
+    values = parse_numbers(b" ".join(rows), np.float64)
     held = len(rows[0].partition(b"#")[0].split())
     if held >= width and values is not None and values.size == held * len(rows):
         return values.reshape(len(rows), held)[:, :width]
@@ -73,7 +76,7 @@ def _corners(faces: list[bytes]) -> tuple[np.ndarray, np.ndarray]:
     slashes = np.add.reduceat(letters == ord("/"), np.flatnonzero(blank[:-1] & ~blank[1:]), dtype=np.int64)
     width = int(slashes[0]) + 1
     if width <= 3 and (slashes == slashes[0]).all():
-        numbers = _parse(text.replace(b"//", b"/0/").replace(b"/", b" "), np.int64)
+        numbers = parse_numbers(text.replace(b"//", b"/0/").replace(b"/", b" "), np.int64)
         if numbers is not None and numbers.size == width * len(slashes):
             corners = np.zeros((len(slashes), 3), np.int64)
             corners[:, :width] = numbers.reshape(-1, width)
@@ -87,7 +90,7 @@ def _corners(faces: list[bytes]) -> tuple[np.ndarray, np.ndarray]:
     return np.array(rows, np.int64).reshape(-1, 3), sizes
 
 
-def _parse(text: bytes, dtype: type) -> np.ndarray | None:
+def parse_numbers(text: bytes, dtype: type) -> np.ndarray | None:
     """Numbers apart by blanks; None where something else is among them."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -100,25 +103,31 @@ def _parse(text: bytes, dtype: type) -> np.ndarray | None:
 def _assemble(
     corners: np.ndarray, sizes: np.ndarray, positions: np.ndarray, uvs: np.ndarray, normals: np.ndarray
 ) -> RawMesh:
-    """Vertices from the corners' combinations of indices, in the order of first use; fans of the polygons."""
-    given = [bool((corners[:, n] != _NONE).all()) for n in range(3)]
+    """Vertices from the corners' combinations of indices, in the order of first use; triangles."""
     tables = {"position": positions, "texture coordinate": uvs, "normal": normals}
     for n, (name, table) in enumerate(tables.items()):
         wrong = (corners[:, n] >= len(table)) | (corners[:, n] < (0 if n == 0 else _NONE))
         if wrong.any():
             raise ValueError(f"a face names {name} {corners[wrong.argmax(), n] + 1} of {len(table)}")
-    key = corners[:, 0].copy()
-    for n, table in ((1, uvs), (2, normals)):
-        if given[n]:
-            key = np.unique(key, return_inverse=True)[1].astype(np.int64) * len(table) + corners[:, n]
-    _, first, vertex = np.unique(key, return_index=True, return_inverse=True)
-    order = np.argsort(first, kind="stable")
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    used = corners[first[order]]
+    without = corners == _NONE
+    has_uvs, has_normals = (~without[:, 1:].all(axis=0)).tolist()
+    columns = [corners[:, 0]]
+    if has_uvs:
+        columns.append(corners[:, 1] + 1)
+    if has_normals:
+        face = np.repeat(np.arange(len(sizes)), sizes)  # a vertex of one face has that face's normal
+        columns.append(np.where(without[:, 2], len(normals) + face, corners[:, 2]))
+    first, vertex = distinct(columns)
+    used = corners[first]
     return RawMesh(
         positions[used[:, 0]],
-        triangle_fans(rank[vertex.reshape(-1)], sizes),
-        normals[used[:, 2]] if given[2] else None,
-        uvs[used[:, 1]] if given[1] else None,
+        vertex[triangulate(positions[corners[:, 0]], sizes)],
+        _rows(normals, used[:, 2]) if has_normals else None,
+        _rows(uvs, used[:, 1]) if has_uvs else None,
+        without[first, 1] if has_uvs and without[:, 1].any() else None,
     )
+
+
+def _rows(table: np.ndarray, indices: np.ndarray) -> np.ndarray:
+    """Rows of a table, 0 where an index names none."""
+    return np.where((indices == _NONE)[:, None], 0.0, table[np.maximum(indices, 0)])

@@ -1,18 +1,30 @@
-"""Binary PLY files that mix triangles with other polygons: trimesh reads none, and Blender writes them."""
+"""PLY files as arrays, ASCII and binary.
+
+trimesh cuts polygons into fans, reads no binary file that mixes them, and keeps one texture coordinate for a
+vertex whose corners name several, so PLY files are read here.
+"""
 
 from __future__ import annotations
 
 import re
+import struct
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from clvol.scene.mesh import RawMesh, triangle_fans
+from clvol.scene.mesh import RawMesh
+from clvol.scene.obj import parse_numbers
+from clvol.scene.polygons import distinct, triangulate
 
 _TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"}
 _TYPES |= {"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"}
 _TYPES |= {"float": "f4", "double": "f8", "float32": "f4", "float64": "f8"}
-_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
+_FORMATS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": "="}
+_UVS = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"))
+_INDICES = ("vertex_indices", "vertex_index")
+_CORNER_UVS = "texcoord"
+_NO_INDEX = 2**62
+"""What indices beyond any table become."""
 
 
 @dataclass
@@ -22,80 +34,201 @@ class _Element:
     properties: list[tuple[str, str, str]] = field(default_factory=list)  # name, type, type of a list's count
 
 
-def read_mixed_ply(data: bytes) -> RawMesh:
-    """The triangles of a binary PLY whose first two elements are its vertices and its faces.
+_Property = tuple[str, np.dtype, np.dtype | None]
+"""Name, type and, of a list, the type of its count."""
+
+
+@dataclass(frozen=True)
+class _Lists:
+    """The rows of a list property: all values in a row, and how many each row has."""
+
+    values: np.ndarray
+    sizes: np.ndarray
+
+
+def read_ply(data: bytes) -> RawMesh:
+    """Positions, faces (polygons as triangles), normals and texture coordinates of a PLY file.
+
+    Texture coordinates may be the vertices' (u, v; s, t; texture_u, texture_v) or the corners' (texcoord).
 
     Raises
     ------
     ValueError
-        Anything else, or a file that ends too early.
+        No PLY, one without vertices or faces, or a file that ends too early.
     """
-    order, elements, body = _header(data)
-    if [element.name for element in elements[:2]] != ["vertex", "face"]:
-        raise ValueError("a ply of other elements than vertices and faces")
-    vertex, face = elements[:2]
-    if any(counted for *_, counted in vertex.properties):
-        raise ValueError("a ply with lists among its vertices")
-    row = np.dtype([(name, order + kind) for name, kind, _ in vertex.properties])
-    vertices = np.frombuffer(body, row, vertex.count)
-    indices, sizes = _polygons(body[vertex.count * row.itemsize :], face, order)
-    positions, normals = (_columns(vertices, names) for names in (("x", "y", "z"), ("nx", "ny", "nz")))
+    form, elements, body = _header(data)
+    if form == "=":
+        body, elements = _as_binary(body, elements)
+    found: dict[str, dict[str, np.ndarray | _Lists]] = {}
+    place = 0
+    for element in elements:
+        found[element.name], place = _rows(body, place, element, form)
+        if {"vertex", "face"} <= set(found):
+            break
+    vertices = found.get("vertex", {})
+    positions = _columns(vertices, ("x", "y", "z"))
     if positions is None:
         raise ValueError("vertices without x, y and z")
-    uvs = [_columns(vertices, names) for names in (("u", "v"), ("s", "t"))]
-    found = next((uv for uv in uvs if uv is not None), None)
-    return RawMesh(positions, triangle_fans(indices, sizes), normals, found)
+    faces = found.get("face", {})
+    polygons = next((faces[name] for name in _INDICES if isinstance(faces.get(name), _Lists)), None)
+    if polygons is None or not len(polygons.sizes):
+        raise ValueError("it has no triangles")
+    uvs = next((uv for names in _UVS if (uv := _columns(vertices, names)) is not None), None)
+    normals = _columns(vertices, ("nx", "ny", "nz"))
+    return _assemble(positions, normals, uvs, polygons, faces.get(_CORNER_UVS))
+
+
+def _assemble(
+    positions: np.ndarray,
+    normals: np.ndarray | None,
+    uvs: np.ndarray | None,
+    polygons: _Lists,
+    corner_uvs: np.ndarray | _Lists | None,
+) -> RawMesh:
+    sizes, corners = polygons.sizes, polygons.values
+    if corners.dtype.kind == "f":
+        corners = np.clip(np.nan_to_num(corners, nan=_NO_INDEX), -_NO_INDEX, _NO_INDEX)
+    corners = corners.astype(np.int64)
+    if (sizes < 3).any():
+        raise ValueError("a face of fewer than three corners")
+    wrong = (corners < 0) | (corners >= len(positions))
+    if wrong.any():
+        raise ValueError(f"a triangle names vertex {corners[wrong.argmax()]} of {len(positions)}")
+    triangles = triangulate(positions[corners] if (sizes > 3).any() else positions[:0], sizes)
+    if uvs is not None or not isinstance(corner_uvs, _Lists):
+        return RawMesh(positions, corners[triangles], normals, uvs)
+    named = corner_uvs.sizes == 2 * sizes
+    if not (named | (corner_uvs.sizes == 0)).all():
+        raise ValueError(f"a face whose {_CORNER_UVS} are not two numbers a corner")
+    has = np.repeat(named, sizes)
+    of_corners = np.zeros((len(corners), 2))
+    of_corners[has] = corner_uvs.values.reshape(-1, 2)
+    known, number = np.unique(of_corners[has], axis=0, return_inverse=True)
+    which = np.full(len(corners), len(known))
+    which[has] = number.reshape(-1)
+    first, vertex = distinct([corners, which])
+    used = corners[first]
+    return RawMesh(
+        positions[used],
+        vertex[triangles],
+        None if normals is None else normals[used],
+        of_corners[first] if named.any() else None,
+        ~has[first] if named.any() and not named.all() else None,
+    )
 
 
 def _header(data: bytes) -> tuple[str, list[_Element], bytes]:
-    """Byte order, elements and what follows the header."""
-    end = re.search(rb"\nend_header\r?\n", data)
+    """Byte order ("=": ASCII), elements and what follows the header."""
+    end = re.search(rb"\nend_header[ \t]*\r?\n", data)
     lines = data[: end.start()].decode("ascii", "replace").splitlines() if end else []
-    order, elements = "", []
+    form, elements = "", []
     for words in (line.split() for line in lines):
         match words:
             case ["format", name, _]:
-                order = _ORDERS.get(name, "")
-            case ["element", name, count] if count.isdigit():
+                form = _FORMATS.get(name, "")
+            case ["element", name, count] if count.isdecimal():
                 elements.append(_Element(name, int(count)))
             case ["property", "list", count, kind, name] if elements:
-                elements[-1].properties.append((name, _TYPES[kind], _TYPES[count]))
+                elements[-1].properties.append((name, _type(kind), _type(count)))
             case ["property", kind, name] if elements:
-                elements[-1].properties.append((name, _TYPES[kind], ""))
-    if not order:
-        raise ValueError("no binary ply")
-    return order, elements, data[end.end() :]
+                elements[-1].properties.append((name, _type(kind), ""))
+    if not form or not lines[0].startswith("ply"):
+        raise ValueError("it has no header of a ply")
+    return form, elements, data[end.end() :]
 
 
-def _columns(rows: np.ndarray, names: tuple[str, ...]) -> np.ndarray | None:
-    """Properties `names` side by side, float64; None where one is missing."""
-    if not set(names) <= set(rows.dtype.names):
-        return None
-    return np.stack([rows[name].astype(np.float64) for name in names], axis=1)
+def _type(name: str) -> str:
+    if name not in _TYPES:
+        raise ValueError(f"a property of type '{name[:40]}'")
+    return _TYPES[name]
 
 
-def _polygons(body: bytes, face: _Element, order: str) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices of all faces in a row, int64, and how many each has."""
-    lists = [n for n, (*_, counted) in enumerate(face.properties) if counted]
-    if len(lists) != 1:
-        raise ValueError("faces of one list of vertices are needed")
-    at = lists[0]
-    _, kind, counted = face.properties[at]
-    skipped = [
-        sum(np.dtype(k).itemsize for _, k, _ in part)
-        for part in (face.properties[:at], face.properties[at + 1 :])
+def _as_binary(body: bytes, elements: list[_Element]) -> tuple[bytes, list[_Element]]:
+    """The numbers of an ASCII file as a binary one of doubles."""
+    numbers = parse_numbers(body, np.float64)
+    if numbers is None:
+        raise ValueError("something other than numbers among its rows")
+    doubles = [
+        _Element(e.name, e.count, [(name, "f8", counted and "f8") for name, _, counted in e.properties])
+        for e in elements
     ]
-    index, length = np.dtype(order + kind), np.dtype(counted).itemsize
-    byte_order = "little" if order == "<" else "big"
-    place, sizes, parts = 0, [], []
-    for _ in range(face.count):
-        first = place + skipped[0] + length
-        size = int.from_bytes(body[first - length : first], byte_order)
-        place = first + size * index.itemsize + skipped[1]
-        if place > len(body) or size < 3:
-            raise ValueError(
-                "the file ends within its faces" if size > 2 else "a face of fewer than three corners"
-            )
-        sizes.append(size)
-        parts.append(body[first : first + size * index.itemsize])
-    return np.frombuffer(b"".join(parts), index).astype(np.int64), np.array(sizes, np.int64)
+    return numbers.tobytes(), doubles
+
+
+def _columns(rows: dict[str, np.ndarray | _Lists], names: tuple[str, ...]) -> np.ndarray | None:
+    """Properties `names` side by side, float64; None where one is missing."""
+    columns = [rows.get(name) for name in names]
+    if not all(isinstance(column, np.ndarray) for column in columns):
+        return None
+    return np.stack([column.astype(np.float64) for column in columns], axis=1)
+
+
+def _rows(
+    body: bytes, place: int, element: _Element, form: str
+) -> tuple[dict[str, np.ndarray | _Lists], int]:
+    """The properties of all rows of an element that begins at byte `place`, and where it ends."""
+    properties = [
+        (n, np.dtype(form + k), np.dtype(form + c) if c else None) for n, k, c in element.properties
+    ]
+    if not element.count or not properties:
+        return {}, place
+    sizes = [counts[0] for counts, _ in _walk(body, place, properties, 1, element.name)[0]]
+    row = []
+    for n, ((_, kind, counted), size) in enumerate(zip(properties, sizes, strict=True)):
+        row += [(f"count {n}", counted)] if counted else []
+        row.append((f"{n}", kind, (size,)))
+    row = np.dtype(row)
+    if row.itemsize * element.count > len(body) - place:
+        return _uneven_rows(body, place, element, properties)
+    table = np.frombuffer(body, row, element.count, place)
+    found = {}
+    for n, ((name, _, counted), size) in enumerate(zip(properties, sizes, strict=True)):
+        values = table[f"{n}"]
+        if not counted:
+            found[name] = values[:, 0]
+        elif (table[f"count {n}"] == size).all():
+            found[name] = _Lists(values.reshape(-1), np.full(element.count, size, np.int64))
+        else:
+            return _uneven_rows(body, place, element, properties)
+    return found, place + row.itemsize * element.count
+
+
+def _uneven_rows(
+    body: bytes, place: int, element: _Element, properties: list[_Property]
+) -> tuple[dict[str, np.ndarray | _Lists], int]:
+    """`_rows` where lists are not all as long as in the first row."""
+    columns, end = _walk(body, place, properties, element.count, element.name)
+    found = {}
+    for (name, kind, counted), (sizes, parts) in zip(properties, columns, strict=True):
+        values = np.frombuffer(b"".join(parts), kind)
+        found[name] = _Lists(values, np.array(sizes, np.int64)) if counted else values
+    return found, end
+
+
+def _walk(
+    body: bytes, place: int, properties: list[_Property], rows: int, name: str
+) -> tuple[list[tuple[list[int], list[bytes]]], int]:
+    """How many values each property has in each row, and their bytes; and where the rows end."""
+    columns = [([], []) for _ in properties]
+    steps = []
+    for (_, kind, counted), (sizes, parts) in zip(properties, columns, strict=True):
+        count = counted and struct.Struct((">" if counted.str[0] == ">" else "<") + counted.char)
+        steps.append((sizes.append, parts.append, kind.itemsize, count))
+    rows_of = {"vertex": "vertices", "face": "faces"}.get(name, f"rows of {name[:40]}")
+    for _ in range(rows):
+        for add_size, add_part, width, count in steps:
+            size = 1
+            if count:
+                if place + count.size > len(body):
+                    raise ValueError(f"the file ends within its {rows_of}")
+                (size,) = count.unpack_from(body, place)
+                place += count.size
+                if not 0 <= size <= len(body):
+                    raise ValueError(f"a list of {size} values among its {rows_of}")
+            end = place + int(size) * width
+            if end > len(body):
+                raise ValueError(f"the file ends within its {rows_of}")
+            add_size(int(size))
+            add_part(body[place:end])
+            place = end
+    return columns, place
