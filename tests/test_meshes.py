@@ -11,7 +11,7 @@ import trimesh
 from mesh_files import TETRAHEDRON_OBJ, ascii_ply, binary_ply, glb, ply_header
 
 from clvol.errors import SceneError
-from clvol.scene import load_dict, scale
+from clvol.scene import gltf, load_dict, scale
 from clvol.scene.mesh import mesh_flaws
 from clvol.scene.primitives import canonical_mesh
 from clvol.scene.records import Mesh
@@ -229,6 +229,26 @@ def test_the_parts_of_a_gltf_scene_are_put_together(mesh):
     np.testing.assert_allclose(found.normals[second], [perpendicular] * 3, atol=1e-7)
 
 
+def test_a_gltf_without_a_material_keeps_its_texture_coordinates(mesh):
+    uvs = [(0, 0.1), (1, 0.1), (0, 1)]
+    found = mesh(glb([TRIANGLE | {"TEXCOORD_0": uvs}], [{"mesh": 0}]), "glb")
+    np.testing.assert_allclose(corners(found, "uvs")[0], uvs, atol=1e-7)
+
+
+def test_a_long_chain_of_nodes_is_walked_once(load, monkeypatch):
+    """Each node's matrix is worked out once, and trimesh sees no chain."""
+    calls = []
+    original = gltf._matrix
+    monkeypatch.setattr(gltf, "_matrix", lambda node: calls.append(0) or original(node))
+    nodes = [{"translation": [0.5, 0, 0], "children": [n + 1]} for n in range(3000)] + [{"mesh": 0}]
+    tree = gltf._plain({"scenes": [{"nodes": [0]}], "nodes": nodes})
+    assert len(calls) == 3000
+    assert [node.get("children") for node in tree["nodes"]] == [None]
+    shape = load(glb([TRIANGLE], nodes, scenes=[{"nodes": [0]}]), "glb")
+    moved = corners(shape.mesh, "vertices")[0] + shape.to_world[:3, 3]
+    np.testing.assert_array_equal(moved, [(1500, 0, 0), (1501, 0, 0), (1500, 1, 0)])
+
+
 # -- what cannot be rendered -----------------------------------------------------------------------
 
 
@@ -287,6 +307,11 @@ BROKEN = {
         b'{"asset": {"version": "2.0"}, "buffers": [{"uri": "no.bin", "byteLength": 4}]}',
         "as gltf",
     ),
+    "outside.gltf": (
+        b'{"asset": {"version": "2.0"}, "buffers": [{"uri": "../mesh.bin", "byteLength": 4}]}',
+        "outside its folder",
+    ),
+    "loop.glb": (glb([TRIANGLE], [{"mesh": 0, "children": [0]}]), "node 0 is below"),
     "words.gltf": (b"not json", "cannot be read as gltf"),
 }
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import io
 import logging
+import os
 from pathlib import Path
 
 import numpy as np
 
 from clvol.files import other_kind
+from clvol.scene.gltf import plain_gltf
 from clvol.scene.mesh import RawMesh, build_mesh
 from clvol.scene.obj import read_obj
 from clvol.scene.ply import read_ply
@@ -65,7 +68,9 @@ def _read_with_trimesh(path: Path, kind: str) -> RawMesh:
 
     with np.errstate(all="ignore"):
         options = {"process": False, "maintain_order": True, "resolver": _regular_files(path)}
-        loaded = trimesh.load(str(path), file_type=kind, **options)
+        data = path.read_bytes()
+        file = io.BytesIO(data if kind == "stl" else plain_gltf(data, kind))
+        loaded = trimesh.load(file, file_type=kind, **options)
     if isinstance(loaded, trimesh.Trimesh):
         return _raw(loaded, np.eye(4))
     parts = []
@@ -83,6 +88,8 @@ def _regular_files(path: Path) -> object:
 
     class RegularFiles(FilePathResolver):
         def get(self, name: str) -> bytes:
+            if not Path(os.path.abspath(Path(self.parent, name.strip()))).is_relative_to(self.parent):
+                raise ValueError(f"'{name}', which it names, lies outside its folder: move it there")
             for part in (name.strip(), name.strip().lstrip("/"), Path(name).name):
                 if kind := other_kind(Path(self.parent, part)):
                     raise ValueError(f"'{part}', which it names, is {kind}, not a file")
