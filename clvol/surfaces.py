@@ -7,16 +7,17 @@ they become floats.
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from clvol import layout
 from clvol.accel.bvh import Bvh, build_bvh, check_mesh, drop_degenerate
 from clvol.boundaries import Boundaries, shape_bounds
+from clvol.errors import SceneError
 from clvol.material_facts import is_transmissive, passes_light
 from clvol.scene import records
-from clvol.scene.mesh import mesh_flaws
+from clvol.scene.mesh import mesh_flaws, turned_mesh
 from clvol.scene.primitives import canonical_mesh
 
 log = logging.getLogger("clvol")
@@ -65,7 +66,7 @@ def prepare_surfaces(scene: records.Scene, found: Boundaries, centre: np.ndarray
         record["flip"] = int(shape.flip_normals)
         record["boundary"] = bits.get(index, -1)
         if index in bits:
-            _warn_of_flaws(shape)
+            shape = shapes[number] = _outward(shape)
         if kind == "mesh":
             meshes.append((number, shape))
             continue
@@ -99,10 +100,15 @@ def _triangles(
     first = filled = 0
     for number, shape, mesh in found:
         name = shape.name or mesh.source or shape.kind
-        check_mesh(mesh.vertices, mesh.faces, name)
         here = vertices[first : first + len(mesh.vertices)]
-        _transform(mesh.vertices, shape.to_world[:3, :3], shape.to_world[:3, 3] - centre, here)
+        with np.errstate(over="ignore", invalid="ignore"):
+            _transform(mesh.vertices, shape.to_world[:3, :3], shape.to_world[:3, 3] - centre, here)
+        check_mesh(here, mesh.faces, name)
         kept, dropped = drop_degenerate(here, mesh.faces)
+        if not len(kept):
+            raise SceneError(
+                "no triangle has an area once it is in the scene: is its to_world too small?", name
+            )
         if dropped:
             log.warning("%s: %d triangles without area are left out", name, dropped)
         rows = faces[filled : filled + len(kept)]
@@ -136,10 +142,13 @@ def _transform_normals(normals: np.ndarray, linear: np.ndarray, out: np.ndarray)
         out[part] = np.divide(moved, length, out=np.zeros_like(moved), where=length > 0)
 
 
-def _warn_of_flaws(shape: records.Shape) -> None:
-    """A shape that light passes through and that is no closed, outward surface bounds a medium badly."""
+def _outward(shape: records.Shape) -> records.Shape:
+    """A shape that bounds a medium, turned where its triangles are closed and face inwards, with a warning.
+
+    Warns also of a shape that light passes through and that is no closed, outward surface.
+    """
     if not (passes_light(shape.bsdf) or is_transmissive(shape.bsdf)):
-        return
+        return shape
     name = shape.name or (shape.mesh.source if shape.mesh else shape.kind)
     if shape.kind in ("rectangle", "disk", "cylinder"):
         flaws = [f"a {shape.kind} is open"]
@@ -147,9 +156,13 @@ def _warn_of_flaws(shape: records.Shape) -> None:
         flaws = _turned([], shape.flip_normals)
     else:
         flaws = mesh_flaws(canonical_mesh(shape.kind) if shape.kind != "mesh" else shape.mesh)
+        if not shape.flip_normals and any(INWARDS in flaw for flaw in flaws):
+            log.warning("%s bounds a medium, but has %s: it is turned", name, flaws[0])
+            return replace(shape, mesh=turned_mesh(shape.mesh))
         flaws = _turned(flaws, shape.flip_normals)
     for flaw in flaws:
         log.warning("%s bounds a medium, but %s: the medium may be missing or too large there", name, flaw)
+    return shape
 
 
 def _turned(flaws: list[str], turned: bool) -> list[str]:

@@ -30,6 +30,7 @@ from surface_scenes import (
 )
 
 from clvol import boundaries, programs, render
+from clvol.errors import SceneError
 from clvol.scene.materials import Dielectric, Diffuse
 from clvol.scene.records import DirectionalEmitter
 
@@ -335,6 +336,26 @@ def test_a_proper_mesh_is_not_warned_of(kind, caplog):
     with caplog.at_level(logging.WARNING, logger="clvol"):
         assert_oracle([shape], fov=14.0)
     assert not caplog.text
+
+
+def test_a_closed_mesh_inside_out_is_turned(caplog):
+    """The picture is that of the proper mesh, bit for bit."""
+    pictures = [
+        show([meshed(_flawed(kind), A, name="the turned one")], spp=64, fov=14.0)
+        for kind in ("proper", "inside out")
+    ]
+    np.testing.assert_array_equal(*(picture.image for picture in pictures))
+    assert pictures[0].image.min() < 1
+    assert "the turned one bounds a medium, but has triangles that face inwards" in caplog.text
+
+
+@pytest.mark.parametrize("size", [1e-200, 1e38, 1e300])
+def test_a_mesh_scaled_out_of_range_is_an_error_that_names_it(size):
+    shape = replace(
+        meshed(_flawed("proper"), A, name="the odd one"), to_world=np.diag([size, size, size, 1.0])
+    )
+    with pytest.raises(SceneError, match="the odd one"):
+        show([shape], spp=1)
 
 
 def _meets_box(scene, half):

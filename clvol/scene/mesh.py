@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -178,6 +178,12 @@ def mesh_flaws(mesh: Mesh) -> list[str]:
         elif volume == 0:
             flaws.append("no volume inside")
     return flaws
+
+
+def turned_mesh(mesh: Mesh) -> Mesh:
+    """The mesh with its inside out."""
+    normals = None if mesh.normals is None else -mesh.normals
+    return replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1]), normals=normals)
 
 
 def _merged(vertices: np.ndarray) -> np.ndarray:
