@@ -17,7 +17,8 @@ from clvol.boundaries import Boundaries, shape_bounds
 from clvol.errors import SceneError
 from clvol.material_facts import is_transmissive, passes_light
 from clvol.scene import records
-from clvol.scene.mesh import mesh_flaws, turned_mesh
+from clvol.scene.mesh import mesh_flaws
+from clvol.scene.orientation import facing_outwards
 from clvol.scene.primitives import canonical_mesh
 
 log = logging.getLogger("clvol")
@@ -143,7 +144,7 @@ def _transform_normals(normals: np.ndarray, linear: np.ndarray, out: np.ndarray)
 
 
 def _outward(shape: records.Shape) -> records.Shape:
-    """A shape that bounds a medium, turned where its triangles are closed and face inwards, with a warning.
+    """A shape that bounds a medium, closed parts that face inwards turned, with a warning.
 
     Warns also of a shape that light passes through and that is no closed, outward surface.
     """
@@ -155,10 +156,12 @@ def _outward(shape: records.Shape) -> records.Shape:
     elif shape.kind == "sphere":
         flaws = _turned([], shape.flip_normals)
     else:
+        if shape.kind == "mesh" and not shape.flip_normals:
+            mesh, turned = facing_outwards(shape.mesh)
+            if turned:
+                log.warning("%s bounds a medium, but has %s: they are turned", name, INWARDS)
+                shape = replace(shape, mesh=mesh)
         flaws = mesh_flaws(canonical_mesh(shape.kind) if shape.kind != "mesh" else shape.mesh)
-        if not shape.flip_normals and any(INWARDS in flaw for flaw in flaws):
-            log.warning("%s bounds a medium, but has %s: it is turned", name, flaws[0])
-            return replace(shape, mesh=turned_mesh(shape.mesh))
         flaws = _turned(flaws, shape.flip_normals)
     for flaw in flaws:
         log.warning("%s bounds a medium, but %s: the medium may be missing or too large there", name, flaw)

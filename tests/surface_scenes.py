@@ -61,9 +61,12 @@ def solid_grid(value, lower, upper, albedo=0.0, **keywords):
 
 
 def moved(shape, offset):
-    to_world = shape.to_world.copy()
-    to_world[:3, 3] += offset
-    return replace(shape, to_world=to_world)
+    """A shape elsewhere, with the grid inside it."""
+    step, medium = clvol.translate(offset), shape.interior
+    if medium is not None and hasattr(medium.sigma_t, "index_to_world"):
+        sigma_t = replace(medium.sigma_t, index_to_world=step @ medium.sigma_t.index_to_world)
+        shape = replace(shape, interior=replace(medium, sigma_t=sigma_t))
+    return replace(shape, to_world=step @ shape.to_world)
 
 
 CORNER = np.array([30.0, 31.0, 29.0])

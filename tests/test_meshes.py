@@ -87,7 +87,7 @@ def test_other_ways_to_write_an_obj_mean_the_same(mesh):
         b"f 1/1/1 2/2/1", b"f  1/1/1 \\\r\n2/2/1"
     )
     found = mesh(
-        odd.replace(b"vn 0 0 1", b"vn 0 0 1 # up") + b"usemtl x\ns 1\nl 1 2\nf 1//1 2//1 3//1 # end\n", "obj"
+        odd.replace(b"vn 0 0 1", b"vn 0 0 1 # up") + b"usemtl x\ns 1\nl 1 2\nf 1//1 3//1 2//1 # end\n", "obj"
     )
     np.testing.assert_array_equal(corners(found, "vertices")[:4], corners(plain, "vertices"))
     np.testing.assert_array_equal(corners(found, "normals")[:4], corners(plain, "normals"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -58,6 +58,7 @@ def build_mesh(raw: RawMesh, source: str, smooth: bool) -> tuple[Mesh, np.ndarra
         local = np.ascontiguousarray(vertices - origin, dtype=np.float32)
     _check_finite(local, "vertex")
     faces = _with_area(local, np.ascontiguousarray(faces, dtype=np.int32), source)
+    faces = _once(local, faces, source)
     uvs = None if raw.uvs is None else np.ascontiguousarray(raw.uvs, dtype=np.float32)
     if uvs is not None:
         _check_finite(uvs, "texture coordinate")
@@ -98,6 +99,41 @@ def _with_area(vertices: np.ndarray, faces: np.ndarray, source: str) -> np.ndarr
         raise ValueError("none of its triangles has an area")
     log.warning("%s: %d of %d triangles have no area and are left out", source, (~kept).sum(), len(faces))
     return faces[kept]
+
+
+def _once(vertices: np.ndarray, faces: np.ndarray, source: str) -> np.ndarray:
+    """Faces without those that lie where another does, turned the same way: light would pass them twice.
+
+    Looked for among those alone whose vertices' places have the same sum, mixed to 64 bits.
+    """
+    sums = _place_sums(vertices, faces)
+    ordered = np.sort(sums)
+    twice = np.unique(ordered[1:][ordered[1:] == ordered[:-1]])
+    if not len(twice):
+        return faces
+    candidates = np.flatnonzero(np.isin(sums, twice))
+    corners = merged_vertices(vertices[faces[candidates].reshape(-1)]).reshape(-1, 3)
+    least = corners.argmin(axis=1)
+    rows = np.stack([corners[np.arange(len(corners)), (least + n) % 3] for n in range(3)], axis=1)
+    first = np.unique(rows, axis=0, return_index=True)[1]
+    extra = np.delete(candidates, first)
+    if not len(extra):
+        return faces
+    log.warning("%s: %d of %d triangles are there twice and left out", source, len(extra), len(faces))
+    return np.delete(faces, extra, axis=0)
+
+
+def _place_sums(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """A number for each face that depends on where its vertices are, in any order; uint64 (m,)."""
+    mixed = np.zeros(len(vertices), np.uint64)
+    for axis in range(3):  # xor and multiply, as in SplitMix64
+        mixed ^= (vertices[:, axis] + np.float32(0)).view(np.uint32)
+        mixed *= np.uint64(0xBF58476D1CE4E5B9)
+        mixed ^= mixed >> np.uint64(29)
+    sums = np.empty(len(faces), np.uint64)
+    for part in _chunks(len(faces)):
+        sums[part] = mixed[faces[part]].sum(axis=1)
+    return sums
 
 
 def _normals(vertices: np.ndarray, faces: np.ndarray, given: np.ndarray | None) -> np.ndarray:
@@ -156,7 +192,7 @@ def mesh_flaws(mesh: Mesh) -> list[str]:
 
     Positions count as one where they are equal exactly: texture seams and hard edges split vertices only.
     """
-    corners = _merged(mesh.vertices)[mesh.faces]
+    corners = merged_vertices(mesh.vertices)[mesh.faces]
     start, end = corners.reshape(-1), np.roll(corners, -1, axis=1).reshape(-1)
     proper = start != end
     start, end = start[proper], end[proper]
@@ -180,13 +216,7 @@ def mesh_flaws(mesh: Mesh) -> list[str]:
     return flaws
 
 
-def turned_mesh(mesh: Mesh) -> Mesh:
-    """The mesh with its inside out."""
-    normals = None if mesh.normals is None else -mesh.normals
-    return replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1]), normals=normals)
-
-
-def _merged(vertices: np.ndarray) -> np.ndarray:
+def merged_vertices(vertices: np.ndarray) -> np.ndarray:
     """A number for each vertex, the same for the same position; int64 (n,)."""
     positive_zeros = np.asarray(vertices, np.float32) + np.float32(0)
     bits = positive_zeros.view(np.uint32).astype(np.uint64)

@@ -6,13 +6,15 @@ import logging
 
 import numpy as np
 
+from clvol.errors import SceneError
+from clvol.material_facts import has_textures
 from clvol.scene.emitter import AreaLight
 from clvol.scene.files import find_parameter
 from clvol.scene.materials import Diffuse
 from clvol.scene.mesh_files import read_mesh
 from clvol.scene.reader import Reader
 from clvol.scene.records import Medium, Mesh, Shape
-from clvol.scene.transforms import keeps_angles, scale, translate
+from clvol.scene.transforms import check_size, keeps_angles, scale, translate
 
 log = logging.getLogger("clvol")
 
@@ -103,6 +105,10 @@ def _frame(z: np.ndarray) -> np.ndarray:
 
 def _shape(reader: Reader, kind: str, to_world: np.ndarray, triangles: Mesh | None = None) -> Shape:
     """A shape with what is inside it.  Without a BSDF it is diffuse, or black if it emits, as in Mitsuba."""
+    try:
+        check_size(to_world)
+    except SceneError as error:
+        reader.fail(error.what, hint=error.hint)
     media = _media(reader)
     emission = _emission(reader)
     bsdf = reader.only_child("bsdf")
@@ -113,7 +119,7 @@ def _shape(reader: Reader, kind: str, to_world: np.ndarray, triangles: Mesh | No
             'add <bsdf type="null"/> to look into it',
             reader.node.where,
         )
-    return Shape(
+    made = Shape(
         kind,
         to_world,
         interior=media.get("interior"),
@@ -124,6 +130,12 @@ def _shape(reader: Reader, kind: str, to_world: np.ndarray, triangles: Mesh | No
         mesh=triangles,
         name=reader.node.id,
     )
+    if triangles is not None and triangles.uvs is None and has_textures(made.bsdf):
+        name = made.name or triangles.source
+        log.warning(
+            "%s has a texture and no texture coordinates: it shows the texture's (0, 0) all over", name
+        )
+    return made
 
 
 def _emission(reader: Reader) -> tuple[float, ...] | None:

@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike
 from clvol.errors import SceneError, shown
 from clvol.masks import as_array
 
+SMALLEST, LARGEST = 1e-18, 1e18
+"""Sizes that can be rendered: their squares are floats."""
+
 
 def translate(v: ArrayLike) -> np.ndarray:
     """Translation by `v` (3 numbers, or one for all axes)."""
@@ -89,10 +92,22 @@ def as_matrix(value: object) -> np.ndarray:
         raise SceneError("the transform is not finite")
     if not np.array_equal(matrix[3], [0, 0, 0, 1]):
         raise SceneError("the transform's last row must be 0 0 0 1 (no projections)")
+    check_size(matrix)
     singular_values = np.linalg.svd(matrix[:3, :3], compute_uv=False)
     if singular_values[-1] <= 1e-12 * singular_values[0]:
         raise SceneError("the transform is singular: it flattens space", hint="look for a scale factor of 0")
     return matrix
+
+
+def check_size(matrix: np.ndarray) -> None:
+    """Raise SceneError for a 4x4 transform to sizes or places that single precision does not hold."""
+    with np.errstate(over="ignore", under="ignore"):
+        size = np.abs(matrix[:3, :3]).max()
+    if not (SMALLEST <= size <= LARGEST and np.abs(matrix[:3, 3]).max() <= LARGEST):
+        raise SceneError(
+            f"the transform scales by {size:.3g} and moves by {np.abs(matrix[:3, 3]).max():.3g}",
+            hint=f"{SMALLEST:g} to {LARGEST:g} can be rendered: take another unit of length",
+        )
 
 
 def _numbers(value: ArrayLike) -> np.ndarray:
