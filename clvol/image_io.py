@@ -18,6 +18,10 @@ SHOULDER = 0.6
 """Linear radiance at which `tone_map` begins to roll off."""
 RESERVED = frozenset({"version", "name", "type", "view", "channels", "compression", "tiles", "lineOrder"})
 """Names EXR keeps for itself: metadata of such a name is written as "clvol:name"."""
+_BLOCK = 16
+"""Rows that an EXR compresses together."""
+_PNG_END = b"IEND\xaeB`\x82"
+"""The last chunk, which readers do not miss."""
 MOST_STOPS = 100.0
 """Exposures beyond it are no pictures, and overflow."""
 BRIGHTEST = np.float32(1e30)
@@ -96,7 +100,7 @@ def encode_png(image: np.ndarray, metadata: Mapping[str, Any], exposure: float =
 
 
 def _encode(kind: str, pixels: np.ndarray, channels: list[str], attributes: Mapping[str, Any]) -> bytes:
-    """Pixels (h, w, channels) of their own type as a file that OpenImageIO makes, read back to be sure.
+    """Pixels (h, w, channels) of their own type as a file that OpenImageIO makes.
 
     The file is made in memory: OpenImageIO tells of a full disk at some writes and not at others.
     """
@@ -112,16 +116,19 @@ def _encode(kind: str, pixels: np.ndarray, channels: list[str], attributes: Mapp
         path = f"/proc/self/fd/{memory.fileno()}"
         output = oiio.ImageOutput.create(kind)
         written = output.open(path, spec) and output.write_image(np.ascontiguousarray(pixels))
+        closed = output.close()
         reason = output.geterror()
-        output.close()
-        if not written or not _reads_as(path, dict(zip(channels, np.moveaxis(pixels, -1, 0), strict=True))):
+        data = memory.read()
+        planes = dict(zip(channels, np.moveaxis(pixels, -1, 0), strict=True))
+        ended = data.endswith(_PNG_END) if kind == "png" else True
+        if reason or not (written and closed and ended and _ends_with(path, planes)):
             first = next(iter(reason.splitlines()), "it cannot be read back")
             raise OptionError(f"cannot make the {kind} file: {first}", hint="is there enough memory?")
-        return memory.read()
+        return data
 
 
-def _reads_as(path: str, planes: Mapping[str, np.ndarray]) -> bool:
-    """Whether the picture file has these very planes, in whatever order."""
+def _ends_with(path: str, planes: Mapping[str, np.ndarray]) -> bool:
+    """Whether the last rows of the picture file are those of the planes: its end is what goes missing."""
     import OpenImageIO as oiio  # noqa: N813
 
     opened = oiio.ImageInput.open(path)
@@ -129,12 +136,14 @@ def _reads_as(path: str, planes: Mapping[str, np.ndarray]) -> bool:
         oiio.geterror()  # or it is printed at the end
         return False
     spec = opened.spec()
-    pixels = opened.read_image(0, 0, 0, spec.nchannels, spec.format)
+    first = max(spec.height - _BLOCK, 0)
+    pixels = opened.read_scanlines(0, 0, first, spec.height, 0, 0, spec.nchannels, spec.format)
+    opened.geterror()
     opened.close()
     if pixels is None:
         return False
     found = {name: pixels[..., n].tobytes() for n, name in enumerate(spec.channelnames)}
-    return found == {name: plane.tobytes() for name, plane in planes.items()}
+    return found == {name: plane[first:].tobytes() for name, plane in planes.items()}
 
 
 def _software(metadata: Mapping[str, Any]) -> str:

@@ -26,7 +26,7 @@ from clvol.estimate import Moments
 from clvol.output_files import check_file, write_file
 from clvol.ray.view import check_output
 from clvol.result import Result
-from clvol.saving import check_disk
+from clvol.saving import check_disk, encode
 
 SCENE = """<scene version="3.0.0"><sensor type="perspective"><film type="hdrfilm">
 <integer name="width" value="64"/><integer name="height" value="64"/></film></sensor>
@@ -114,6 +114,16 @@ def test_no_picture_is_cut_short(tmp_path: Path, name: str, limit: int) -> None:
     with no_file_over(limit), pytest.raises(OptionError, match="no other place to keep"):
         noise().save(tmp_path / name)
     assert only(tmp_path, name).read_bytes() == b"earlier"
+
+
+@pytest.mark.parametrize("suffix", [".png", ".exr"])
+def test_wherever_memory_ends_no_file_is_taken_for_whole(suffix: str) -> None:
+    whole = len(encode(noise(16), suffix))
+    for limit in [*range(1, whole - 40, 997), *range(whole - 40, whole)]:
+        with no_file_over(limit), pytest.raises(OptionError, match="cannot make the"):
+            encode(noise(16), suffix)
+    with no_file_over(whole):
+        assert len(encode(noise(16), suffix)) == whole
 
 
 @pytest.mark.parametrize("name", ["a.png", "a.exr"])
