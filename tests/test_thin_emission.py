@@ -54,6 +54,18 @@ def test_every_technique_shows_the_emission_of_thin_media(technique, colours):
         assert_matches(result, emitted(PROFILE, GLOW, scale), bias=0.04)
 
 
+@pytest.mark.parametrize(("factor", "bound"), [(0.14, 1.0), (0.58, 0.25)])
+def test_a_walk_of_several_legs_gathers_no_part_of_a_thin_medium_twice(bounds, factor, bound):
+    """Most of the depth in the first leg; also where a bound that does not hold makes it seem thin."""
+    bounds(WALK_STEPS=2)
+    profile, glow = np.array([1.0, 1.0, *[0.01] * 7]), GLOW[::-1]
+    dark = ConstVolume((0.0,))
+    medium = Medium(layers(profile), dark, (factor,), homogeneous=False, emission=layers(glow))
+    options = {"technique": "regular", "majorant_scale": bound}
+    result = render(seen(medium), spp=1 << 16, seed=6, **options)
+    assert_matches(result, emitted(profile, glow, (factor,)), bias=0.02)
+
+
 @pytest.mark.parametrize("colours", SCALES)
 def test_homogeneous_media_show_it_at_any_depth(colours):
     for factor in (1e-8, 0.1, 3.0):

@@ -2,7 +2,12 @@
    evenly, instead of at tentative collisions.
 
    Estimates the integral of T sigma_a L_e over the stretch, with the transmittance to the point by ratio tracking
-   under the medium's global bound: unbiased for any bound, and of finite relative variance however thin. */
+   under the medium's global bound: unbiased for any bound, and of finite relative variance however thin.
+
+   A walk that stops short leaves what is beyond to its next leg, and one that collides before where it would have
+   stopped must not count that part, or it would count twice.  It never does: one number places the point, evenly, and
+   decides the flight, and 1 - T at a place is at most THIN_DEPTH of its share of the stretch.  So a flight that
+   collides has its point before any place that it did not get to; for this the bound has to hold. */
 #ifndef CLVOL_TRACKING_THIN_EMISSION_H
 #define CLVOL_TRACKING_THIN_EMISSION_H
 #include "tracking/collision.h"
@@ -29,7 +34,7 @@ INLINE float thin_point(const MediumRay *in, uint first)
     return uniform_float(first) * in->t_max;
 }
 
-/* and gathers its emission.  It may also decide the flight, since sums keep their mean whatever they share. */
+/* and gathers its emission.  It also decides the flight: sums keep their mean whatever they share. */
 INLINE Spectrum thin_emission(const MediumRay *in, uint first, Stream *stream, Tally *tally, Spectrum beta)
 {
     const float rate = global_rate(in), t = thin_point(in, first);
