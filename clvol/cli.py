@@ -6,6 +6,7 @@ Heavy modules are imported where they are used.
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -156,6 +157,9 @@ def render(
         check_picture(output, exposure)
     if options["aov"] and not any(output.lower().endswith(".exr") for output in outputs):
         raise click.UsageError("--aov needs an .exr to write to")
+    if exposure and not any(output.lower().endswith(".png") for output in outputs):
+        raise click.UsageError("--exposure needs a .png to write to: an .exr is as bright as the scene")
+    _check_distinct(scene, outputs)
     console = error_console()
     with _logging_to(console, verbose):
         import clvol
@@ -185,6 +189,16 @@ def render(
     for failure in failures.values():
         raise failure
     exit_by(result.stats["interrupted"])
+
+
+def _check_distinct(scene: str, outputs: Sequence[str]) -> None:
+    """Refuse pictures that would replace each other or the scene, whatever the links to them."""
+    names = {os.path.realpath(scene): "the scene"}
+    for output in outputs:
+        place = os.path.realpath(output)
+        if place in names:
+            raise click.UsageError(f"{output}: would replace {names[place]}")
+        names[place] = "another picture"
 
 
 @contextmanager

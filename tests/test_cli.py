@@ -336,3 +336,18 @@ def test_devices_lists_each_with_its_platform() -> None:
     assert outcome.exit_code == 0, outcome.output
     assert outcome.stdout.startswith("0: ")
     assert "compute units" in outcome.stdout
+
+
+def test_a_picture_replaces_neither_the_scene_nor_another_picture(scene: str, tmp_path: Path) -> None:
+    link, before = tmp_path / "link.exr", Path(scene).read_text()
+    link.symlink_to(scene)
+    assert_one_line_error(run("render", scene, "-o", link), "would replace the scene")
+    assert Path(scene).read_text() == before
+    outputs = "-o", tmp_path / "a.exr", "-o", tmp_path / "." / "a.exr"
+    assert_one_line_error(run("render", scene, *outputs), "would replace another picture")
+
+
+def test_exposure_without_a_png_is_refused(scene: str, tmp_path: Path) -> None:
+    assert_one_line_error(
+        run("render", scene, "-o", tmp_path / "a.exr", "--exposure", 1), "--exposure needs a .png"
+    )
