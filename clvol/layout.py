@@ -61,7 +61,8 @@ MEDIUM = _record(
     ("temperature_volume", "i", 1),
     ("temperature_scale", "f", 1),
     ("temperature_offset", "f", 1),
-    ("majorant", "f", 1),  # global bound of the volume; sigma_t multiplies it
+    ("majorant", "f", 1),  # greatest of the cells', for the whole medium; sigma_t multiplies it
+    ("bound", "f", 1),  # the same, and a bound also where majorant_scale makes majorants none
     ("cells", "i", 3),  # majorant cells per axis
     ("cell_offset", "i", 1),  # first row in `majorants`, `controls` and `residuals`
     ("cell_size", "f", 1),  # edge of a majorant cell in index units

@@ -72,8 +72,8 @@ def medium_table(prepared: PreparedScene, volumes: dict[int, int], step: float |
         record["box_lower"] = (to_brick @ [*medium.sigma_t.lower, 1.0])[:3]
         record["box_upper"] = (to_brick @ [*medium.sigma_t.upper, 1.0])[:3]
         record["march_step"] = step or voxel_edges(volume).min()
-        # a bound also where majorant_scale makes the cells' bounds none
-        record["majorant"] = max(majorant.majorant.max(), volume.bricks.peak.max())
+        record["majorant"] = majorant.majorant.max()
+        record["bound"] = max(record["majorant"], volume.bricks.peak.max())
         record["cells"], record["cell_size"] = majorant.cells, majorant.cell_size
         record["cell_offset"], record["kd_root"] = cell_offset, kd_root
         record["links_first"], record["links_levels"] = links_first, majorant.levels

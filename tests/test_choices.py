@@ -189,3 +189,15 @@ def test_choices_are_checked_when_they_are_made():
     with pytest.raises(OptionError, match="unknown majorant"):
         Choices(majorant="octree")
     assert Choices(aov="cells").aov == ("cells",)
+
+
+@pytest.mark.parametrize("majorant", ["global", "grid", "kdtree"])
+def test_a_majorant_scaled_down_is_violated_and_counted(majorant):
+    low, sound = (
+        clvol.render(
+            scene(), spp=16, seed=1, technique="weighted-delta", majorant=majorant, majorant_scale=scale
+        ).stats
+        for scale in (0.4, 1.0)
+    )
+    assert sound["majorant_violations"] == 0 < low["majorant_violations"]
+    assert low["tentative_collisions"] < sound["tentative_collisions"]

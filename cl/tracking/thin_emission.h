@@ -20,7 +20,7 @@
 
 INLINE float global_rate(const MediumRay *in)
 {
-    return in->rate * in->medium->majorant;
+    return in->rate * in->medium->bound;
 }
 
 INLINE bool is_thin(const MediumRay *in)
