@@ -34,6 +34,19 @@ def test_closed_parts_that_face_inwards_are_turned_and_cavities_are_not():
     assert (a * np.cross(b, c)).sum() / 6 == pytest.approx(64 - 8 + 1 + 1)
 
 
+def test_a_mesh_that_is_inside_out_as_a_whole_is_turned_as_a_whole():
+    right = together(cube(0, 4), cube(1, 3, inwards=True), cube(1.5, 2.5), cube(5, 6))
+    mesh, turned = facing_outwards(Mesh(right.vertices, right.faces[:, ::-1].copy()))
+    assert turned == 4
+    np.testing.assert_array_equal(mesh.faces, right.faces)
+
+
+def test_a_solid_inside_of_a_solid_stays():
+    """Nothing says that it should be a cavity."""
+    both = together(cube(0, 4), cube(1, 3))
+    assert facing_outwards(both) == (both, 0)
+
+
 def test_an_open_mesh_is_not_turned():
     vertices, faces = cube(inwards=True)
     mesh = Mesh(vertices, faces[:-1])

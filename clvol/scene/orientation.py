@@ -20,35 +20,56 @@ def facing_outwards(mesh: Mesh) -> tuple[Mesh, int]:
 
     A part is what hangs together by vertices at the same place.  It faces inwards where the volume that its
     winding encloses is negative (divergence theorem), unless it lies inside of an odd number of others: then
-    it is the wall of a cavity, and right.
+    it is the wall of a cavity, and right.  In a part that is turned, walls of cavities that face outwards are
+    turned as well: the file is inside out as a whole.
     """
     corners = merged_vertices(mesh.vertices)[mesh.faces]
     count, part = _parts(corners)
     volumes = np.bincount(part, _volumes(mesh), count)
-    inwards = np.flatnonzero((volumes < 0) & _closed(corners, part, count))
-    if not len(inwards):
+    closed = _closed(corners, part, count)
+    inwards, outwards = (np.flatnonzero(closed & side).tolist() for side in (volumes < 0, volumes > 0))
+    if not inwards:
         return mesh, 0
-    lower, upper = (np.full((count, 3), end) for end in (np.inf, -np.inf))
-    for n in range(3):
-        np.minimum.at(lower, part, mesh.vertices[mesh.faces[:, n]])
-        np.maximum.at(upper, part, mesh.vertices[mesh.faces[:, n]])
-    first = np.unique(part, return_index=True)[1]
-    turned, tests = [], 0
-    for number in inwards:
-        around = np.flatnonzero((lower <= lower[number]).all(1) & (upper >= upper[number]).all(1))
-        around = around[around != number]
-        tests += len(around)
-        if tests > _MOST_TESTS:
-            return mesh, 0
-        point = mesh.vertices[mesh.faces[first[number]]].mean(axis=0, dtype=np.float64)
-        if sum(_is_inside(point, mesh.vertices[mesh.faces[part == other]]) for other in around) % 2 == 0:
-            turned.append(number)
+    nesting = _Nesting(mesh, part, count)
+    try:
+        turned = [n for n in inwards if len(nesting.around(n)) % 2 == 0]
+        walls = ((n, nesting.around(n)) for n in outwards if turned)
+        turned += [n for n, around in walls if len(around) % 2 == 1 and not set(around).isdisjoint(turned)]
+    except _TooManyPartsError:
+        return mesh, 0
     if not turned:
         return mesh, 0
     faces = mesh.faces.copy()
     flipped = np.isin(part, turned)
     faces[flipped] = faces[flipped][:, ::-1]
     return replace(mesh, faces=faces, normals=_turned_normals(mesh, flipped)), len(turned)
+
+
+class _TooManyPartsError(Exception):
+    """More pairs of parts to look at than are worth it."""
+
+
+class _Nesting:
+    """Which parts of a mesh lie inside of which: by their boxes first, then by a point of the inner one."""
+
+    def __init__(self, mesh: Mesh, part: np.ndarray, count: int) -> None:
+        self.mesh, self.part, self.tests = mesh, part, 0
+        self.first = np.unique(part, return_index=True)[1]
+        self.lower, self.upper = (np.full((count, 3), end) for end in (np.inf, -np.inf))
+        for n in range(3):
+            np.minimum.at(self.lower, part, mesh.vertices[mesh.faces[:, n]])
+            np.maximum.at(self.upper, part, mesh.vertices[mesh.faces[:, n]])
+
+    def around(self, number: int) -> list[int]:
+        """The parts that a part lies inside of."""
+        boxes = (self.lower <= self.lower[number]) & (self.upper >= self.upper[number])
+        candidates = [int(n) for n in np.flatnonzero(boxes.all(axis=1)) if n != number]
+        self.tests += len(candidates)
+        if self.tests > _MOST_TESTS:
+            raise _TooManyPartsError
+        vertices, faces = self.mesh.vertices, self.mesh.faces
+        point = vertices[faces[self.first[number]]].mean(axis=0, dtype=np.float64)
+        return [n for n in candidates if _is_inside(point, vertices[faces[self.part == n]])]
 
 
 def _parts(corners: np.ndarray) -> tuple[int, np.ndarray]:
