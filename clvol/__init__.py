@@ -7,7 +7,12 @@
 Names are imported when first used, so that `import clvol` and `clvol --help` stay quick.
 """
 
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
+from types import FrameType
 
 from clvol.version import __version__
 
@@ -39,10 +44,24 @@ __all__ = ["__version__", *_EXPORTS]
 def __getattr__(name: str) -> object:
     if name not in _EXPORTS:
         raise AttributeError(f"module 'clvol' has no attribute {name!r}")
-    value = getattr(import_module(_EXPORTS[name]), name)
+    with _undisturbed():
+        value = getattr(import_module(_EXPORTS[name]), name)
     globals()[name] = value
     return value
 
 
-def __dir__() -> list[str]:
-    return sorted(__all__)
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Ctrl-C waits until the block is through: pyopencl ends the process where its import is cut short."""
+    previous = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(previous):
+        yield
+        return
+    pressed: list[FrameType | None] = []
+    signal.signal(signal.SIGINT, lambda _number, frame: pressed.append(frame))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)
+    if pressed:
+        previous(signal.SIGINT, pressed[0])

@@ -110,7 +110,6 @@ def ray(
     functions, in the first medium that the ray enters.
     """
     import clvol
-    from clvol.ray.trace import trace_ray
     from clvol.ray.view import check_output
 
     outputs = outputs or ("ray.png",)
@@ -119,7 +118,7 @@ def ray(
     loaded = clvol.load_file(scene, **dict(definitions))
     number = None if channel is None else CHANNELS.index(channel)
     with _bar(quiet) as progress:
-        view = trace_ray(loaded, x, y, channel=number, progress=progress, **options)
+        view = clvol.trace_ray(loaded, x, y, channel=number, progress=progress, **options)
         for output in outputs:
             view.save(output)
     if not quiet:

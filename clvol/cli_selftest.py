@@ -68,13 +68,12 @@ def selftest(
     from rich.console import Console
 
     import clvol
-    from clvol.measure.selftests import selftest as run
     from clvol.progress import error_console
 
     loaded = clvol.load_file(scene, **dict(definitions))
     try:
         with _Steps(error_console()) as steps:
-            found = run(
+            found = clvol.selftest(
                 loaded,
                 quick=quick,
                 seconds=seconds,

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -42,6 +43,24 @@ def handlers() -> Iterator[None]:
     for number, handler in previous.items():
         signal.signal(number, handler)
     assert list(after.values()) == [signal.default_int_handler, signal.SIG_DFL, signal.SIG_DFL]
+
+
+def test_ctrl_c_waits_for_an_import(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cut short, pyopencl's ends the process with SIGABRT."""
+
+    def import_module(name: str) -> object:
+        signal.raise_signal(signal.SIGINT)
+        time.sleep(0.01)
+        loaded.append(name)
+        return interrupts
+
+    loaded: list[str] = []
+    monkeypatch.setattr(clvol, "import_module", import_module)
+    monkeypatch.setitem(clvol._EXPORTS, "Interrupt", "clvol.interrupts")
+    with pytest.raises(KeyboardInterrupt):
+        _ = clvol.Interrupt
+    assert loaded == ["clvol.interrupts"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def render(tmp_path: Path, *options: str) -> Result:

@@ -1,7 +1,7 @@
 """Volume files and arrays to sampled fields on the host (`grid`): OpenVDB, Mitsuba .vol, NumPy.
 
-Readers live here, with the checks that broken and hostile files need; brick maps, majorants and the
-device do not.
+Readers live here, with the checks that broken and hostile files need, and the brick maps made of what they
+read; majorants and the device do not.
 """
 
 from clvol.volumes.check import check_coefficients, check_finite
