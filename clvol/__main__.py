@@ -1,6 +1,6 @@
 """`python -m clvol` is the command `clvol`."""
 
-from clvol.cli import main
+from clvol.cli.main import main
 
 if __name__ == "__main__":
     main(prog_name="clvol")

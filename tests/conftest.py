@@ -50,7 +50,7 @@ def pytest_collection_modifyitems(config, items):
 def independent_samples():
     """Tests judge single pixels by their variance, which has many degrees of freedom where samples are
     independent: that is the default here.  Low-discrepancy samples are asked for by name (test_sobol.py)."""
-    from clvol import choices
+    from clvol.planning import choices
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(choices, "DEFAULT_SAMPLER", "independent")
@@ -60,7 +60,7 @@ def independent_samples():
 @pytest.fixture
 def bounds(monkeypatch):
     """Compiles other bounds into the kernels, as WALK_STEPS=3."""
-    from clvol import programs
+    from clvol.device import programs
 
     compose = programs.compose
 
@@ -87,7 +87,7 @@ def ctrl_c():
 @pytest.fixture(scope="session")
 def device():
     """The device that CLVOL_DEVICE selects, else the default one."""
-    from clvol.device import open_device
+    from clvol.device.device import open_device
 
     return open_device()
 

@@ -12,7 +12,7 @@ from efficiency import Rounds, efficiencies, efficiency_ratio, image_mean, pixel
 from mitsuba_side import REQUIREMENT, MitsubaSide, mitsuba_python
 from scene_options import OpenScene, open_scene
 
-from clvol.result import Result
+from clvol.picture.result import Result
 from clvol.version import __version__
 
 EFFICIENCY_TARGET = 8.0

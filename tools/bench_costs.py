@@ -15,7 +15,7 @@ from bench_tables import Figures, Row, at_most, ranged, show
 from efficiency import spread
 
 import clvol
-from clvol.prepare import prepare
+from clvol.tables.prepare import prepare
 
 SCENES = Path(__file__).resolve().parent.parent / "scenes"
 COLD_TARGET, WARM_TARGET, LOAD_TARGET = 15.0, 3.0, 3.0
@@ -31,7 +31,14 @@ def measure_startup(rounds: int) -> Figures:
             with tempfile.TemporaryDirectory(prefix="clvol-bench-") as folder:
                 caches = {"POCL_CACHE_DIR": f"{folder}/pocl", "XDG_CACHE_HOME": f"{folder}/xdg"}
                 Path(folder, "pocl").mkdir()
-                command = [sys.executable, "-m", "clvol.cli", "render", str(SCENES / f"{name}.xml"), *size]
+                command = [
+                    sys.executable,
+                    "-m",
+                    "clvol",
+                    "render",
+                    str(SCENES / f"{name}.xml"),
+                    *size,
+                ]
                 command += ["--spp", "1", "--quiet", "-o", f"{folder}/image.exr"]
                 for state in ("cold", "warm"):
                     started = time.perf_counter()

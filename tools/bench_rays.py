@@ -29,9 +29,9 @@ from bench_costs import peak_bytes
 from bench_tables import Figures, Row, Unavailable, at_least, judge, ranged, show
 from efficiency import spread
 
-from clvol import programs
 from clvol.accel.bvh import Bvh, build_bvh
-from clvol.device import Device, open_device
+from clvol.device import programs
+from clvol.device.device import Device, open_device
 
 REQUIREMENT = "embreex"
 SIZES = (70_000, 1_000_000)

@@ -17,11 +17,11 @@ import numpy as np
 from bench_tables import Figures, Row, ranged, thread_count
 from efficiency import Rounds, efficiency_ratio, image_mean, pixel_variance, z_score
 
-from clvol.choices import Choices, prepare_for
-from clvol.device import open_device
+from clvol.device.device import open_device
+from clvol.planning.choices import Choices, prepare_for
+from clvol.rendering.session import Session
 from clvol.scene import load_file
 from clvol.scene.records import ConstVolume, Scene
-from clvol.session import Session
 
 CLOUD = Path(__file__).resolve().parent.parent / "scenes" / "cloud.xml"
 SIGMA_T, ALBEDO = (60.0, 30.0, 10.0), (0.95, 0.9, 0.8)

@@ -21,7 +21,7 @@ from docs_tables import ROOT, performance_part, pilot_page, techniques_page
 from documents import between, writable, write
 from pilot import SCENES, pilot_options, tested
 
-from clvol.cli_options import OneLineErrors
+from clvol.cli.options import OneLineErrors
 
 DOCS, README = ROOT / "docs", ROOT / "README.md"
 FIRST, LAST = "<!-- performance: written by tools/docs.py -->", "<!-- end of performance -->"
@@ -48,7 +48,7 @@ def run(words: list[str], name: str) -> None:
             next(rest)
         else:
             kept.append(word)
-    command = [sys.executable, "-m", "clvol.cli", *kept, "-o", f"docs/{name}.png"]
+    command = [sys.executable, "-m", "clvol.cli.main", *kept, "-o", f"docs/{name}.png"]
     if subprocess.run(command, cwd=ROOT).returncode:
         raise click.ClickException(f"{shlex.join(words)} failed; what it said stands above")
 

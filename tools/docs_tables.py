@@ -15,9 +15,9 @@ from bench_tables import markdown, thread_count
 from pilot import HEADER, HOPELESS, Tested
 
 import clvol
-from clvol.comparison.figures import Comparison, Figures
-from clvol.device import open_device
-from clvol.registry import TECHNIQUES, TRANSMITTANCES
+from clvol.device.device import open_device
+from clvol.lab.comparison.figures import Comparison, Figures
+from clvol.planning.registry import TECHNIQUES, TRANSMITTANCES
 
 ROOT = Path(__file__).resolve().parent.parent
 SMALL = {"width": 48, "height": 64}

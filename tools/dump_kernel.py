@@ -10,10 +10,10 @@ from pathlib import Path
 import click
 from scene_options import choice_options, open_scene
 
-from clvol.cli_options import ExplainedCommand, definitions_option, fail
-from clvol.config import KernelConfig
+from clvol.cli.options import ExplainedCommand, definitions_option, fail
+from clvol.device.programs import stage_source
 from clvol.errors import DeviceError, Error
-from clvol.programs import stage_source
+from clvol.planning.config import KernelConfig
 
 
 def dump(config: KernelConfig, folder: Path) -> list[Path]:

@@ -19,14 +19,14 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-from clvol.choices import Choices
-from clvol.cli_options import device_option
-from clvol.device import open_device
-from clvol.measure.candidates import Candidate, Relative, error, inverse_efficiency, relative_efficiency
-from clvol.measure.combinations import independent_seeds, unbiased
-from clvol.measure.pilot import CHOSEN, ROUNDS, Found, Pilot
-from clvol.measure.pilot import HOPELESS as SLOW
-from clvol.measure.quiet import quiet_renders
+from clvol.cli.options import device_option
+from clvol.device.device import open_device
+from clvol.lab.candidates import Candidate, Relative, error, inverse_efficiency, relative_efficiency
+from clvol.lab.combinations import independent_seeds, unbiased
+from clvol.lab.pilot import CHOSEN, ROUNDS, Found, Pilot
+from clvol.lab.pilot import HOPELESS as SLOW
+from clvol.lab.quiet import quiet_renders
+from clvol.planning.choices import Choices
 from clvol.scene import load_file
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import click
 
-from clvol.choices import Choices, prepare_for
-from clvol.cli_options import RegistryChoice, device_option
-from clvol.config import KernelConfig
-from clvol.device import Device, open_device
-from clvol.prepare import PreparedScene
-from clvol.registry import FAMILIES
+from clvol.cli.options import RegistryChoice, device_option
+from clvol.device.device import Device, open_device
+from clvol.planning.choices import Choices, prepare_for
+from clvol.planning.config import KernelConfig
+from clvol.planning.registry import FAMILIES
+from clvol.rendering.session import Session, kernel_config
 from clvol.scene import load_file
-from clvol.session import Session, kernel_config
+from clvol.tables.prepare import PreparedScene
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ def open_scene(
 
 
 def choice_options(command: Callable) -> Callable:
-    """One option for each family of choices in `clvol.registry`, and the device."""
+    """One option for each family of choices in `clvol.planning.registry`, and the device."""
     command = device_option(command)
     for family in reversed(FAMILIES):
         command = click.option(f"--{family}", type=RegistryChoice(family), default="auto")(command)

@@ -1,6 +1,6 @@
 /* The BSDF of a material: dispatches to the kinds that the scene has.
 
-   The headers of those kinds are included before this one (BSDF_HEADERS in clvol/material_table.py), with
+   The headers of those kinds are included before this one (BSDF_HEADERS in clvol/tables/materials.py), with
    CLVOL_BSDF_<kind> 1; of the others there is nothing.  A mask is the `opacity` of a material, which the caller decides
    first; all here is what is left of the surface then.  One-sided kinds reflect on the side of +z alone: the caller
    picks the side's material and turns z (material_transmits). */

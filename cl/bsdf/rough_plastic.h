@@ -1,7 +1,7 @@
 /* A diffuse base under a coat of microfacets.
 
    What the coat lets through, over the cosine of incidence in TRANSMITTANCE_ENTRIES steps, is in material_tables
-   (clvol/material_table.py). */
+   (clvol/tables/materials.py). */
 #ifndef CLVOL_BSDF_ROUGH_PLASTIC_H
 #define CLVOL_BSDF_ROUGH_PLASTIC_H
 #include "bsdf/fresnel.h"

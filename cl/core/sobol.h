@@ -1,9 +1,9 @@
 /* Sampler "sobol": each block of decisions takes its numbers from a Sobol' sequence in four dimensions, with a
-   pixel's samples in an order of its own and Owen-scrambled anew (clvol/sobol.py), so that samples cover each
+   pixel's samples in an order of its own and Owen-scrambled anew (clvol/tables/sobol.py), so that samples cover each
    decision evenly.
 
    Every number alone is exactly uniform and independent of the others of its path: no mean changes.
-   Samples of one randomisation depend on each other; randomisations do not (clvol/estimate.py). */
+   Samples of one randomisation depend on each other; randomisations do not (clvol/picture/estimate.py). */
 #ifndef CLVOL_CORE_SOBOL_H
 #define CLVOL_CORE_SOBOL_H
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clvol.rows import bands
+from clvol.base.rows import bands
 from clvol.scene.files import find_parameter
 from clvol.scene.image import image_from_array, read_image
 from clvol.scene.reader import BRIGHTEST, Reader

@@ -6,8 +6,8 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from clvol.base.files import other_kind
 from clvol.errors import SceneError
-from clvol.files import other_kind
 from clvol.scene.reader import Reader
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from clvol.base.image_reading import UnreadableError, read_stored
+from clvol.base.masks import masked_count
+from clvol.base.rows import bands
 from clvol.errors import SceneError
-from clvol.image_reading import UnreadableError, read_stored
-from clvol.masks import masked_count
-from clvol.rows import bands
 from clvol.scene.spectra import srgb_to_linear
 
 

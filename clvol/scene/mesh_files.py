@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from clvol.files import other_kind
+from clvol.base.files import other_kind
 from clvol.scene.gltf import plain_gltf
 from clvol.scene.mesh import RawMesh, build_mesh
 from clvol.scene.obj import read_obj

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clvol.base.masks import as_array, masked_count
 from clvol.errors import SceneError, shown
-from clvol.masks import as_array, masked_count
 from clvol.scene import spectra
 from clvol.scene.nodes import NAMELESS, Node
 from clvol.scene.records import Spectrum

@@ -138,7 +138,7 @@ class Medium:
 
     It emits sigma_a · L_e per length, where L_e = emission_scale · emission · blackbody(kelvin), without the
     factor that is None (both: no emission at all), and kelvin = (temperature − temperature_offset) ·
-    temperature_scale.  The blackbody is `clvol.blackbody.blackbody_rgb`: of luminance 1, and 0 where
+    temperature_scale.  The blackbody is `clvol.tables.blackbody.blackbody_rgb`: of luminance 1, and 0 where
     kelvin <= 0.
     """
 

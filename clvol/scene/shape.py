@@ -7,9 +7,9 @@ import logging
 import numpy as np
 
 from clvol.errors import SceneError
-from clvol.material_facts import has_textures
 from clvol.scene.emitter import AreaLight
 from clvol.scene.files import find_parameter
+from clvol.scene.material_facts import has_textures
 from clvol.scene.materials import Diffuse
 from clvol.scene.mesh_files import read_mesh
 from clvol.scene.reader import Reader

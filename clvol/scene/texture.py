@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clvol.rows import bands
+from clvol.base.rows import bands
 from clvol.scene.files import find_parameter
 from clvol.scene.image import image_from_array, read_image
 from clvol.scene.materials import Bitmap, Checkerboard, Texture

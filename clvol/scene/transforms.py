@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clvol.base.masks import as_array
 from clvol.errors import SceneError, shown
-from clvol.masks import as_array
 
 SMALLEST, LARGEST = 1e-18, 1e18
 """Sizes that can be rendered: their squares are floats."""

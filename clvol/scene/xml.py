@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from clvol.base.files import other_kind
 from clvol.errors import SceneError, shortened, shown
-from clvol.files import other_kind
 from clvol.scene import transforms
 from clvol.scene.files import find
 from clvol.scene.nodes import NAMELESS, Node

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import NoReturn
 from xml.parsers import expat
 
+from clvol.base.files import open_regular
 from clvol.errors import SceneError
-from clvol.files import open_regular
 from clvol.scene.nodes import MAX_DEPTH
 
 

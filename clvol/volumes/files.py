@@ -11,9 +11,9 @@ from typing import BinaryIO
 import numpy as np
 import numpy.typing as npt
 
+from clvol.base.files import open_regular
+from clvol.base.memory import available_memory
 from clvol.errors import VolumeError
-from clvol.files import open_regular
-from clvol.memory import available_memory
 
 TRUNCATED = "the file is truncated or damaged: copy or export it again"
 

@@ -14,8 +14,8 @@ from typing import BinaryIO
 
 import numpy as np
 
+from clvol.base.masks import as_array, masked_count
 from clvol.errors import VolumeError
-from clvol.masks import as_array, masked_count
 from clvol.volumes.files import CHUNK, MAX_BYTES, TRUNCATED, allocate, fill, open_binary, place
 from clvol.volumes.grid import DenseGrid
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from clvol.base.files import other_kind
 from clvol.errors import VolumeError
-from clvol.files import other_kind
 from clvol.volumes.files import NANOVDB
 from clvol.volumes.grid import Grid
 from clvol.volumes.numpy_files import read_numpy

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from clvol.base.masks import masked_count
+from clvol.base.output_files import replacing
 from clvol.errors import VolumeError
-from clvol.masks import masked_count
-from clvol.output_files import replacing
 from clvol.volumes.files import TRUNCATED, allocate, fill, open_binary
 from clvol.volumes.grid import DenseGrid
 

@@ -1,0 +1,214 @@
+"""`clvol.render`: from a scene and the user's choices to a Result."""
+
+from __future__ import annotations
+
+import logging
+import math
+import operator
+import time
+from collections.abc import Sequence
+from contextlib import nullcontext
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from clvol.base.arguments import check_seed, positive
+from clvol.base.interrupts import interruptible
+from clvol.base.progress import Progress, ProgressCallback, RichProgress
+from clvol.device.device import Device, open_device
+from clvol.errors import OptionError, shown
+from clvol.picture.result import Result
+from clvol.planning import registry
+from clvol.planning.choices import Choices
+from clvol.rendering.adaptive import TargetRender
+from clvol.rendering.session import MAX_SAMPLES, Session
+from clvol.scene.records import Scene
+
+if TYPE_CHECKING:
+    from clvol.lab.pilot import Found
+
+log = logging.getLogger("clvol")
+
+
+def render(
+    scene: Scene,
+    *,
+    spp: int | None = None,
+    seed: int | None = None,
+    technique: str = "auto",
+    transmittance: str = "auto",
+    majorant: str = "auto",
+    lookup: str = "auto",
+    absorption: str = "auto",
+    probability: str = "auto",
+    control: str = "auto",
+    sampler: str = "auto",
+    majorant_scale: float = 1.0,
+    step: float | None = None,
+    aov: Sequence[str] = (),
+    time_limit: float | None = None,
+    target_error: float | None = None,
+    device: str | None = None,
+    progress: bool | ProgressCallback = False,
+    samples: tuple[int, int] | None = None,
+    pool: int | None = None,
+) -> Result:
+    """Render a scene.
+
+    Parameters
+    ----------
+    scene : from `load_file` or `load_dict`.
+    spp, seed : samples per pixel and 64-bit seed; default to the scene's.
+    technique, transmittance, majorant, lookup, absorption, probability, control, sampler : names from
+        `clvol.planning.registry`; "auto" takes the scene's own choice, else follows fixed rules, so that
+        the same seed gives the same bits; technique "auto:pilot" has a short measured pilot choose technique,
+        transmittance and majorant, where they are left at auto (`result.metadata["repeat"]` says what).
+    majorant_scale : multiplies every bound of the density, for experiments; below 1 only for techniques and
+        transmittances that stay unbiased there.
+    step : world length of a step of ray marching; the edge of a voxel by default.
+    aov : names from `registry.AOVS` to add to `result.aovs`: means per sample ("largest_weight": maxima).
+    time_limit : seconds after which no new pass of samples is begun; alone it replaces `spp`.  Passes begun
+        are finished, unless paths go on for more than 10 seconds (30 where no pass is finished yet).
+    target_error : mean relative standard error (`Result.noise`) at which the render ends, judged by a pilot
+        that is not in the picture; pixels get samples by their noise.  `spp` then is the most on the mean.
+    device : index or part of the name of an OpenCL device (see `clvol devices`).
+    progress : True for a progress bar, or a callable that receives `clvol.base.progress.Progress` records.
+    samples : (first, count): render only these of the samples; results of disjoint ranges `merge`.
+    pool : paths in flight, for measurements; the picture does not depend on it.
+
+    Returns
+    -------
+    Result.  Ctrl-C finishes the paths in flight and returns the picture so far, with
+    ``stats["interrupted"]`` set; a second Ctrl-C does not wait for them and keeps the samples that every
+    pixel has; a third raises KeyboardInterrupt.
+
+    Raises
+    ------
+    OptionError, SceneError, VolumeError, DeviceError : a choice, scene, volume or device that won't do.
+    RenderError : the render was to end, and no pass of samples ever did.
+    """
+    if not isinstance(scene, Scene):
+        raise OptionError(
+            f"render takes a Scene, not {type(scene).__name__}", hint="make one with load_file or load_dict"
+        )
+    asked = {
+        "technique": technique,
+        "transmittance": transmittance,
+        "majorant": majorant,
+        "lookup": lookup,
+        "absorption": absorption,
+        "probability": probability,
+        "control": control,
+        "sampler": sampler,
+    }
+    piloted = isinstance(technique, str) and technique == registry.PILOT
+    if piloted:
+        asked["technique"] = "auto"
+    names = {family: _choice(scene, family, value) for family, value in asked.items()}
+    if piloted:
+        names["technique"] = "auto"  # the scene's own technique too is put to the test
+    choices = Choices(**names, majorant_scale=majorant_scale, step=step, target_error=target_error, aov=aov)
+    if target_error is not None and samples is not None:
+        raise OptionError("target_error and samples exclude each other", hint="spp says how many at most")
+    first, count = _sample_range(scene, spp, time_limit, samples)
+    seed = check_seed(scene.seed if seed is None else seed)
+    bar = RichProgress() if progress is True else nullcontext(progress or None)
+    opened = open_device(device)
+    if piloted:
+        with bar as callback:
+            choices, found, given = _piloted(opened, scene, choices, seed, count, time_limit, callback)
+    session = Session.for_scene(opened, scene, choices, seed, pool)
+    session.describe()
+    session.warn_of_unused(asked)
+    with interruptible() as interrupt:
+        with bar as callback:
+            interrupt.heed(patience=2)
+            if target_error is None:
+                done = session.run(first, count, time_limit, callback, interrupt.urgency)
+            else:
+                done = TargetRender(session, target_error, spp).run(time_limit, callback, interrupt.urgency)
+            interrupt.keep()
+        result = session.result(first, done)
+        result.stats["interrupted"] = interrupt.asked()
+    if target_error is not None:
+        result.metadata["target_error"] = target_error
+    if piloted:
+        if target_error is not None:
+            extent = {"spp": spp, "time": time_limit}
+        else:  # a time limit is repeated by the samples it was enough for
+            extent = {"samples": f"{first},{done}"} if first else {"spp": done}
+        _say_how_to_repeat(result, scene, found, given | extent | {"seed": seed, "device": device})
+    return result
+
+
+def _say_how_to_repeat(result: Result, scene: Scene, found: Found, options: dict[str, Any]) -> None:
+    """What the pilot chose, and the command that renders the same without it."""
+    from clvol.lab.repeat import repeat_command
+
+    repeat = repeat_command(scene, found.options, options)
+    log.info("repeat with: %s", repeat)
+    result.metadata |= {"pilot": found.options, "pilot_reason": found.reason, "repeat": repeat}
+
+
+def _piloted(
+    device: Device,
+    scene: Scene,
+    choices: Choices,
+    seed: int,
+    count: int,
+    time_limit: float | None,
+    callback: ProgressCallback | None,
+) -> tuple[Choices, Found, dict[str, Any]]:
+    """What a pilot makes of `choices`, what it found, and the options that were given beside it."""
+    from clvol.lab.pilot import pilot
+
+    started = time.perf_counter()
+
+    def tell(done: int, total: int) -> None:
+        if callback is not None:
+            callback(Progress(done, total, time.perf_counter() - started, what="pilot"))
+
+    even = replace(choices, target_error=None)  # its trials give every pixel as many samples
+    found = pilot(device, scene, even, seed=seed, spp=count, time_limit=time_limit, tell=tell)
+    log.info("pilot: %s; %s", ", ".join(f"{k} {v}" for k, v in found.names.items()), found.reason)
+    given = {f: n for f, n in choices.names.items() if n != "auto" and f not in found.names}
+    if choices.majorant_scale != 1:
+        given["majorant_scale"] = choices.majorant_scale
+    for name in ("step", "target_error", "aov"):
+        given[name] = getattr(choices, name)
+    return replace(choices, **found.names), found, given
+
+
+def _choice(scene: Scene, family: str, value: str) -> str:
+    """The caller's choice, else the scene's, else auto."""
+    if isinstance(value, str) and value == "auto":
+        return registry.check_choice(family, scene.integrator.choices.get(family, "auto"))
+    return registry.check_choice(family, value, pilot=True)
+
+
+def _sample_range(
+    scene: Scene, spp: int | None, time_limit: float | None, samples: tuple[int, int] | None
+) -> tuple[int, int]:
+    """First sample and how many; a time limit alone sets no end."""
+    if samples is not None and spp is not None:
+        raise OptionError("spp and samples exclude each other", hint="samples=(first, count) says both")
+    if time_limit is not None and time_limit != math.inf:
+        positive("time limit ", time_limit, " of seconds")
+    if samples is not None:
+        if not isinstance(samples, tuple | list) or len(samples) != 2:
+            raise OptionError(f"samples={shown(samples)} is not a pair", hint="give (first, count)")
+        first, count = samples
+    elif time_limit is not None and spp is None:
+        first, count = 0, MAX_SAMPLES
+    else:
+        first, count = 0, scene.spp if spp is None else spp
+    try:
+        first, count = operator.index(first), operator.index(count)
+    except TypeError:
+        given = f"not {shown(first)} and {shown(count)}"
+        raise OptionError("numbers of samples must be whole", hint=given) from None
+    if first < 0 or count < 1 or first + count > MAX_SAMPLES:
+        raise OptionError(
+            f"cannot render {count} samples per pixel from sample {first} on",
+            hint=f"give at least 1 sample, and at most {MAX_SAMPLES} in all",
+        )
+    return first, count

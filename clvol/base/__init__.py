@@ -1,0 +1,1 @@
+"""What every room uses: checked arguments, files, memory, signals, progress.  Imports errors alone."""

@@ -1,0 +1,1 @@
+"""The command `clvol`: one file for each of its commands."""

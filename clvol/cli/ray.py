@@ -1,0 +1,142 @@
+"""`clvol ray`: what techniques do along one camera ray, as a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import click
+
+from clvol.cli.options import (
+    ExplainedCommand,
+    RegistryChoice,
+    definitions_option,
+    device_option,
+    majorant_scale_option,
+    quiet_option,
+    step_option,
+    tell,
+)
+
+EXAMPLES = """
+\b
+Examples:
+  clvol ray scenes/cloud.xml 64 64
+  clvol ray scenes/smoke.xml 180 120 --techniques delta,spectral,regular -o ray.svg
+  clvol ray scenes/cloud.xml 40 70 --techniques delta,decomposition --majorant kdtree -o ray.png -o ray.json
+  clvol ray scenes/cloud.xml 64 64 --transmittances ratio,residual-ratio --control min -o transmittance.pdf
+"""
+WATCHED = ("technique", "transmittance")
+CHANNELS = ("red", "green", "blue")
+UNUSED = ("sampler",)
+"""Families that decide nothing inside a medium: walks here have independent numbers of their own."""
+
+
+class Names(RegistryChoice):
+    """Several names of one family, with commas between them."""
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        """How the list stands in --help."""
+        return "NAME,…"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The names as a tuple; OptionError where there is none, or one is unknown."""
+        if not isinstance(value, str):
+            return value
+        from clvol.lab.comparison.names import split_names
+
+        return split_names(self.name, value)
+
+
+def _other_families(command: Any) -> Any:
+    """An option for each family that a walk depends on."""
+    from clvol.planning.registry import FAMILIES, FAMILY_PURPOSE
+
+    for family in reversed([f for f in FAMILIES if f not in (*WATCHED, *UNUSED)]):
+        option = click.option(
+            f"--{family}", type=RegistryChoice(family), default="auto", help=FAMILY_PURPOSE[family]
+        )
+        command = option(command)
+    return command
+
+
+@click.command("ray", cls=ExplainedCommand, epilog=EXAMPLES)
+@click.argument("scene", metavar="SCENE")
+@click.argument("x", type=int, metavar="X")
+@click.argument("y", type=int, metavar="Y")
+@click.option(
+    "-o",
+    "--output",
+    "outputs",
+    metavar="FILE",
+    multiple=True,
+    help="Figure to write, .png, .svg or .pdf, or the numbers, .json; ray.png by default.",
+)
+@click.option(
+    "--techniques",
+    "--technique",
+    type=Names("technique"),
+    help="How collisions are sampled; three that differ by default.",
+)
+@click.option(
+    "--transmittances",
+    "--transmittance",
+    type=Names("transmittance"),
+    help="How transmittance is estimated; ratio,residual-ratio by default.",
+)
+@_other_families
+@majorant_scale_option
+@step_option
+@click.option("--channel", type=click.Choice(CHANNELS), help="The most attenuated by default.")
+@click.option("--walks", type=click.IntRange(1, 100), default=6, help="Walks shown one by one; 6 by default.")
+@click.option("--seed", type=click.IntRange(min=0), help="Same seed, same walks; the scene's own by default.")
+@device_option
+@definitions_option
+@quiet_option
+def ray(
+    scene: str,
+    x: int,
+    y: int,
+    outputs: tuple[str, ...],
+    channel: str | None,
+    definitions: tuple[tuple[str, str], ...],
+    quiet: bool,
+    **options: Any,
+) -> None:
+    """Draw what techniques do along the camera ray through the centre of pixel X, Y of SCENE.
+
+    Pixels count from 0, from the left and from the top.  The walks are those of a render, by the same device
+    functions, in the first medium that the ray enters.
+    """
+    import clvol
+    from clvol.lab.ray.view import check_output
+
+    outputs = outputs or ("ray.png",)
+    for output in outputs:
+        check_output(output)
+    loaded = clvol.load_file(scene, **dict(definitions))
+    number = None if channel is None else CHANNELS.index(channel)
+    with _bar(quiet) as progress:
+        view = clvol.trace_ray(loaded, x, y, channel=number, progress=progress, **options)
+        for output in outputs:
+            view.save(output)
+    if not quiet:
+        tell([", ".join(outputs), *view.summary()])
+
+
+@contextmanager
+def _bar(quiet: bool) -> Iterator[Callable[[int, int, str], None] | None]:
+    """A progress bar on standard error, with the time left."""
+    if quiet:
+        yield None
+        return
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from clvol.base.progress import error_console
+
+    columns = TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn()
+    console = error_console()
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("loading", total=None)
+        yield lambda done, total, what: bar.update(task, completed=done, total=total, description=what)

@@ -1,0 +1,196 @@
+"""What a pilot measures of each combination, and how it compares them by 1 / (variance · seconds).
+
+All combinations have the same expectation.  One that missed rare samples of much light shows little variance
+and a picture too dark, and would look the better for it: what it lacks beside the others counts as its error.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from clvol.device.device import Device
+from clvol.lab.agreement import ROUNDING, region_sums
+from clvol.lab.trials import Trial
+from clvol.rendering.outcome import LARGE_WEIGHT
+
+DEVIATIONS, TILE_DEVIATIONS = 3.0, 4.0
+"""By so many standard errors a picture's mean, and one of its many tiles, may be darker than another's."""
+MOST = 1e6
+"""Largest ratio of efficiencies that is told from any other."""
+_TILE = 8  # edge in pixels
+_LATE = 1000.0  # precomputation that leaves no time counts as if it left this part of it
+
+
+def clock(device: Device) -> float:
+    """Seconds of this process where it renders on a processor, so that other programs on it do not count; of
+    the wall clock elsewhere.  A processor's threads all count: renders keep them busy, precomputation one."""
+    return time.process_time() if device.is_cpu else time.perf_counter()
+
+
+@dataclass(eq=False)
+class Candidate:
+    """A combination of the pilot and its rounds.
+
+    Parameters
+    ----------
+    label : the choices of `CHOSEN` in force.
+    images : float32 (height, width, channels) of each round.  seconds : of each round.
+    extra : seconds that precomputation adds to a round, see `precomputation`.
+    largest_weight : of any round.
+    """
+
+    label: str
+    trial: Trial
+    images: list[np.ndarray] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+    extra: float = 0.0
+    largest_weight: float = 1.0
+
+    @property
+    def heavy(self) -> bool:
+        """Whether its weights grew so large that it is noisier than its rounds show."""
+        return self.largest_weight > LARGE_WEIGHT
+
+    @property
+    def variance(self) -> np.ndarray:
+        """Of a round, the mean over channels, between rounds; float64 (pixels,)."""
+        return np.var(self.images, axis=0, ddof=1, dtype=np.float64).mean(axis=-1).ravel()
+
+    def regions(self, edge: int) -> tuple[np.ndarray, np.ndarray]:
+        """Means over squares of edge² pixels and over all rounds, and the variance of these; float64
+        (regions y, regions x, channels) each."""
+        images = np.asarray(self.images, np.float64)
+        pixels = region_sums(np.ones((*images.shape[1:3], 1)), edge)
+        variance = region_sums(images.var(axis=0, ddof=1), edge) / pixels**2 / len(images)
+        return region_sums(images.mean(axis=0), edge) / pixels, variance
+
+    def since(self, first: int) -> Candidate:
+        """With the rounds from the given one on alone."""
+        return replace(self, images=self.images[first:], seconds=self.seconds[first:])
+
+    def render(self, seed: int, spp: int) -> None:
+        """Render another round.  A processor's seconds are those of its `clock` over its threads."""
+        session = self.trial.session
+        session.restart(seed)
+        started = clock(session.device)
+        done = session.run(0, spp, None, None, lambda: False)
+        spent = clock(session.device) - started
+        result = session.result(0, done)
+        self.images.append(result.image)
+        self.largest_weight = max(self.largest_weight, result.stats["largest_weight"])
+        self.seconds.append(spent / (session.device.info.compute_units if session.device.is_cpu else 1))
+
+
+@dataclass(frozen=True)
+class Relative:
+    """An efficiency over another's, with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        return f"{self.value:.2f} ({self.low:.2f} to {self.high:.2f})"
+
+
+def blind(one: Candidate, other: Candidate) -> bool:
+    """Whether all rounds of `one` are the same picture, to which the other's samples only ever add light: it
+    saw nothing of what the other sees."""
+    if one.variance.any():
+        return False
+    added = np.asarray(other.images, np.float64) - one.images[0]
+    rounding = ROUNDING * max(float(np.abs(images).max()) for images in (other.images, one.images[0]))
+    return bool(added.max() > rounding and added.min() >= -rounding)
+
+
+def shortfall(one: Candidate, other: Candidate) -> float:
+    """Variance of a round of `one`, the mean over pixels, that the light it lacks beside `other` tells of.
+
+    Both have the same expectation, so that light which one has and the other lacks beyond their noise is in
+    rare samples that the darker one missed.  Were it a single sample, in a region of n pixels and R rounds,
+    a mean short by d would tell of a variance of n · R · d² in a pixel of a round; it is so much at least.
+    """
+    found = 0.0
+    certain = blind(one, other)
+    pixels_of = np.ones((*one.images[0].shape[:2], 1))
+    for edge, deviations in ((_TILE, TILE_DEVIATIONS), (max(pixels_of.shape), DEVIATIONS)):
+        (mean, variance), (its_mean, its_variance) = one.regions(edge), other.regions(edge)
+        known = 0.0 if certain else deviations * np.sqrt(variance + its_variance)
+        rounding = ROUNDING * np.maximum(np.abs(mean), np.abs(its_mean))
+        lacking = np.maximum(its_mean - mean - known - rounding, 0.0)
+        pixels = region_sums(pixels_of, edge)
+        missed = pixels * len(one.images) * lacking**2
+        found = max(found, float((missed * pixels).sum() / (pixels.sum() * missed.shape[-1])))
+    return found
+
+
+def error(one: Candidate, others: Sequence[Candidate]) -> np.ndarray:
+    """Variance of a round of `one`, raised by what it lacks beside any of the others; float64 (pixels,)."""
+    return one.variance + max((shortfall(one, other) for other in others if other is not one), default=0.0)
+
+
+def inverse_efficiency(variance: np.ndarray, seconds: np.ndarray, extra: float) -> float:
+    """Mean variance of a round · (seconds of a round + what precomputation adds to each).
+
+    The seconds are the rounds' median, which does not fall with their number.
+    """
+    return float(variance.mean() * (np.median(seconds) + extra))
+
+
+def relative_efficiency(one: Candidate, other: Candidate, resamples: int = 400) -> Relative:
+    """Efficiency of one over the other's: its interval is a bootstrap over pixels and over rounds."""
+    if one is other:
+        return Relative(1.0, 1.0, 1.0)
+    random = np.random.default_rng(1)
+    sides = []
+    for candidate, beside in ((other, one), (one, other)):
+        sides.append((error(candidate, [beside]), np.array(candidate.seconds), candidate.extra))
+    pixels = len(sides[0][0])
+    drawn = np.empty(resamples)
+    for n in range(resamples):
+        at = random.integers(pixels, size=pixels)
+        parts = [inverse_efficiency(v[at], random.choice(s, len(s)), extra) for v, s, extra in sides]
+        drawn[n] = _quotient(*parts)
+    value = _quotient(*(inverse_efficiency(*side) for side in sides))
+    return Relative(value, *(float(q) for q in np.quantile(drawn, (0.025, 0.975))))
+
+
+def _quotient(a: float, b: float) -> float:
+    """a / b, at most `MOST` and at least its inverse; 1 where both are 0: black pictures are all alike."""
+    return 1.0 if a == b else min(max(a / b, 1 / MOST), MOST) if b > 0 else MOST
+
+
+def precomputation(seconds: float, render_seconds: float, rounds: float | None, limit: float | None) -> float:
+    """Seconds that precomputation adds to a pilot's round, in proportion to the requested render.
+
+    Parameters
+    ----------
+    seconds : of precomputation.  render_seconds : of the round.
+    rounds : how many rounds the render is worth; None where `limit` seconds end it.
+    """
+    if rounds is not None:
+        return seconds / rounds
+    left = max(limit - seconds, limit / _LATE)
+    return render_seconds * (limit / left - 1)
+
+
+def doubtful(one: Candidate, auto: Candidate, measured: Sequence[Candidate]) -> bool:
+    """Whether it is noisier than its rounds show: blind, or of large weights where auto's choice is not."""
+    return one.heavy > auto.heavy or any(blind(one, other) for other in measured)
+
+
+def halve(candidates: list[Candidate], auto: Candidate, measured: Sequence[Candidate]) -> list[Candidate]:
+    """The better half, rounded up, best first; of two, one.  Better are the more efficient by what all the
+    measured ones show, and those that are not doubtful."""
+    cost = {
+        id(c): (
+            doubtful(c, auto, measured),
+            inverse_efficiency(error(c, measured), np.array(c.seconds), c.extra),
+        )
+        for c in candidates
+    }
+    return sorted(candidates, key=lambda c: cost[id(c)])[: (len(candidates) + 1) // 2]

@@ -1,0 +1,20 @@
+"""Speed against error on a user's own scene: combinations of choices, measured by turns, and the report.
+
+names.py and combine.py say what is compared, measure.py renders it, figures.py makes numbers of it, words.py
+sentences, plots.py pictures, report.py a folder.  The statistics are in `clvol.lab.efficiency` and
+`clvol.lab.agreement`.  Names are imported when first used, so that the command line stays quick.
+"""
+
+from importlib import import_module
+
+_EXPORTS = {"Comparison": "clvol.lab.comparison.figures", "compare": "clvol.lab.comparison.comparing"}
+
+__all__ = list(_EXPORTS)
+
+
+def __getattr__(name: str) -> object:
+    if name not in _EXPORTS:
+        raise AttributeError(f"module 'clvol.lab.comparison' has no attribute {name!r}")
+    value = getattr(import_module(_EXPORTS[name]), name)
+    globals()[name] = value
+    return value

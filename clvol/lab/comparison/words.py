@@ -1,0 +1,282 @@
+"""A comparison in words: sentences for the report, and the table that a terminal shows."""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+import shutil
+import sys
+import textwrap
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from clvol.lab.comparison.figures import ALPHA, COSTS, LEVEL, Comparison, Efficiency, Figures
+from clvol.lab.comparison.measure import uses_sobol
+from clvol.lab.efficiency import Interval
+
+_HEAVY = 0.5
+"""A round with more of the squared error than this, and than four times its share, is not like the others."""
+
+
+@dataclass(frozen=True)
+class Sentence:
+    """kind : "finding", "verdict" or "warning"."""
+
+    kind: str
+    text: str
+
+
+def times(interval: Interval) -> str:
+    """A ratio with its interval: "2.31 (2.05 to 2.60)"; "unknown" where it is."""
+    if not math.isfinite(interval.value):
+        return "unknown"
+    return f"{interval.value:.3g} ({interval.low:.3g} to {interval.high:.3g})"
+
+
+def sentences(comparison: Comparison) -> list[Sentence]:
+    """Everything that a reader should know, the most important first."""
+    found = [Sentence("finding", text) for cost in COSTS for text in _efficiency(comparison, cost)]
+    found += [Sentence("finding", text) for text in _what_significant_means(comparison)]
+    for figures in comparison.figures:
+        found += [Sentence("verdict", _verdict(figures)), Sentence("verdict", _slope(figures))]
+        if math.isfinite(figures.render_slope.value):
+            found.append(Sentence("verdict", _render_slope(figures)))
+    return found + [Sentence("warning", text) for text in _warnings(comparison)]
+
+
+def _efficiency(comparison: Comparison, cost: str) -> Iterator[str]:
+    known = {f.label: f.efficiency[cost] for f in comparison.figures if cost in f.efficiency}
+    spp = {f.label: f.measured.spp for f in comparison.figures}
+    if not known:
+        return
+    base = comparison.baseline
+    others = {label: e for label, e in known.items() if label != base}
+    for label, e in sorted(others.items(), key=lambda item: -item[1].ratio.value):
+        at = f"{spp[label]}" if spp[label] == spp[base] else f"{spp[label]} against {spp[base]}"
+        yield (
+            f"By {COSTS[cost]}, {label} is {times(e.ratio)} times as efficient as {base} "
+            f"at {at} spp a render{_significance(e)}."
+        )
+
+
+def _what_significant_means(comparison: Comparison) -> Iterator[str]:
+    """Once, whatever the kinds of cost: each has the same number of tests."""
+    others = [f for f in comparison.figures if f.label != comparison.baseline]
+    known = [
+        COSTS[c]
+        for c in COSTS
+        if any(math.isfinite(f.efficiency[c].adjusted_p) for f in others if c in f.efficiency)
+    ]
+    if len(others) > 1 and known:
+        yield (
+            f"Significant means that the chance of calling any of these {len(others)} wrongly different from "
+            f"{comparison.baseline} is {100 * LEVEL:.0f} %, by {' and by '.join(known)} each (Holm's "
+            "correction); intervals are 95 % each."
+        )
+
+
+def _significance(e: Efficiency) -> str:
+    if not math.isfinite(e.adjusted_p):
+        return ": not known, for want of a measurable error or cost"
+    p = "p < 0.0001" if e.adjusted_p < 1e-4 else f"p = {e.adjusted_p:.2g}"
+    if e.significant:
+        return f": significantly {'more' if e.ratio.value > 1 else 'less'} ({p})"
+    return f": no significant difference ({p})"
+
+
+def _verdict(figures: Figures) -> str:
+    verdict = figures.verdict
+    if not verdict.agrees:
+        blame = (
+            "as its label says"
+            if figures.biased
+            else "though neither should be biased, so that one is wrong (clvol selftest)"
+        )
+        return f"{figures.label} differs from the reference, {blame}: {verdict.explanation}."
+    label = ", labelled as biased," if figures.biased else ""
+    found = verdict.explanation
+    if math.isfinite(verdict.smallest_bias):
+        found = (
+            f"no difference beyond noise (p = {verdict.p:.2g}, an alarm is below {ALPHA:g}); a bias of "
+            f"{verdict.smallest_bias:.2g} of the mean would have been seen"
+        )
+    return f"{figures.label}{label} agrees with the reference: {found}."
+
+
+def _slope(figures: Figures) -> str:
+    label, slope = figures.label, figures.slope
+    means = f"MSE of means of k separate renders of {figures.measured.spp} spp falls over k with slope"
+    if not math.isfinite(slope.value):
+        return f"{label}: the slope of its error is unknown, the error is too near the reference's."
+    low = f"{slope.low:.2f}" if math.isfinite(slope.low) else "-∞"
+    band = f"{slope.value:.2f} ({low} to {slope.high:.2f})"
+    if slope.low > -1 and (figures.biased or not figures.verdict.agrees):
+        floor = math.sqrt(max(figures.relative_squared_bias, 0.0))
+        return (
+            f"{label} flattens: the {means} {band} where noise alone has -1; more samples do not bring its "
+            f"relative RMSE below about {floor:.2g}, which is bias."
+        )
+    if not slope.low <= -1 <= slope.high:
+        than = "flatter" if slope.low > -1 else "steeper"
+        return (
+            f"{label}'s {means} {band}, a little {than} than the -1 of noise alone; chance does that to "
+            "about 3 in 100 unbiased combinations"
+            + ("." if figures.biased else ", and the tests against the reference decide on bias.")
+        )
+    hidden = (
+        ", so that its bias hides in its noise here" if figures.biased else ", as noise without bias does"
+    )
+    return f"{label}'s {means} {band}, compatible with -1{hidden}."
+
+
+def _render_slope(figures: Figures) -> str:
+    slope, measured = figures.render_slope, figures.measured
+    meaning = "compatible with the -1 of independent samples"
+    if slope.high < -1:
+        meaning = "faster than the -1 of independent samples"
+    elif slope.low > -1:
+        meaning = "slower than the -1 of independent samples"
+    return (
+        f"The MSE of one render of {figures.label} falls over its samples, {min(measured.shorter)} to "
+        f"{measured.spp} spp, with slope {slope.value:.2f} (95 %: {slope.low:.2f} to {slope.high:.2f}), "
+        f"{meaning}."
+    )
+
+
+def _warnings(comparison: Comparison) -> Iterator[str]:
+    if comparison.interrupted:
+        count = len(comparison.figures[0].seconds)
+        yield f"Interrupted: only the {count} rounds that were complete are in this report."
+    for said, why in comparison.left_out:
+        yield f"{said} is left out: {why}."
+    for said, label in comparison.doubles:
+        if said == label:
+            yield f"{label} was asked for in more than one way, and was measured once."
+        else:
+            yield f"{said} comes to the same as {label} on this scene, and was measured once."
+    if not comparison.reference.variance_known:
+        yield (
+            "The reference came without its variance, which could not be subtracted: all errors are too "
+            "large by the same amount, curves flatten, and disagreement with it may be its own noise."
+        )
+    for figures in comparison.figures:
+        share, count = figures.worst_round, len(figures.seconds)
+        if share > max(_HEAVY, 4 / count):
+            yield (
+                f"One round has {share:.0%} of {figures.label}'s squared error: rare bright samples. Its "
+                "interval may be too narrow; measure with more rounds."
+            )
+        if figures.biased:
+            yield (
+                f"{figures.label} is biased: its efficiency is that of a render as long as all its rounds, "
+                "and is less for longer ones."
+            )
+        spp = figures.measured.spp
+        if uses_sobol(figures.measured.trial) and (spp < 4 or spp & (spp - 1)):
+            yield (
+                f"{figures.label} draws from Sobol' sequences, whose gain is full at 4, 8, 16, … samples a "
+                f"render; it has {spp}."
+            )
+        for note in figures.measured.notes:
+            yield f"{figures.label}: {note}."
+
+
+VERDICTS = {
+    (False, True): "no bias seen",
+    (False, False): "BIASED",
+    (True, True): "labelled biased, not seen here",
+    (True, False): "biased, as labelled",
+}
+"""In the summary, by what its label says and whether it agrees with the reference."""
+
+
+def table_rows(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
+    """Headings and rows of the summary."""
+    heads = [
+        "combination",
+        "spp a render",
+        "rel. RMSE",
+        "seconds",
+        "look-ups per sample",
+        "efficiency by time",
+        "efficiency by look-ups",
+        "slope over renders",
+        "over samples",
+        "largest error",
+        "verdict",
+    ]
+    rows = []
+    for f in comparison.figures:
+        pixels = f.measured.images[0, ..., 0].size
+        per_sample = float(f.measured.lookups.mean()) / (pixels * f.measured.spp)
+        ratios = [_cell(f, cost, comparison.baseline) for cost in COSTS]
+        slopes = [f"{s.value:.2f}" if math.isfinite(s.value) else "–" for s in (f.slope, f.render_slope)]
+        rows.append(
+            [
+                f.label,
+                str(f.measured.spp),
+                f"{math.sqrt(max(f.relmse.value[-1], 0.0)):.3g}",
+                f"{f.seconds[-1]:.3g}",
+                f"{per_sample:.3g}",
+                *ratios,
+                *slopes,
+                f"{f.largest_error.difference:+.2g}",
+                VERDICTS[f.biased, f.verdict.agrees],
+            ]
+        )
+    return heads, rows
+
+
+def _cell(figures: Figures, cost: str, baseline: str) -> str:
+    if cost not in figures.efficiency:
+        return "–"
+    e = figures.efficiency[cost]
+    if figures.label == baseline:
+        return "1 (baseline)"
+    return times(e.ratio).replace(" to ", "–") + (" *" if e.significant else "")
+
+
+def text_table(comparison: Comparison, width: int | None = None) -> str:
+    """The summary as plain text: a table, or a paragraph each where that is wider than `width` characters.
+
+    None takes the terminal's width, and any where there is none.  Nothing is cut.
+    """
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    heads, rows = table_rows(comparison)
+    table = Table(box=box.SIMPLE, title=None)
+    for number, head in enumerate(heads):
+        table.add_column(head, justify="left" if number == 0 else "right")
+    for row in rows:
+        table.add_row(*map(Text, row))
+    console = Console(file=io.StringIO(), width=10_000, color_system=None)
+    console.print(table)
+    lines = [line.rstrip() for line in console.file.getvalue().splitlines() if line.strip()]
+    width = _terminal_width() if width is None else width
+    if width and max(map(len, lines)) > width:
+        lines = [line for row in rows for line in _paragraph(heads, row, width)]
+    if any(e.significant for f in comparison.figures for e in f.efficiency.values()):
+        lines.append(f"* significantly different from {comparison.baseline}")
+    return "\n".join(lines)
+
+
+def _paragraph(heads: list[str], row: list[str], width: int) -> list[str]:
+    """A combination's name and, below it, its cells; a line breaks only between them where it can."""
+    cells = "; ".join(
+        f"{head}: {cell}".replace(" ", "\xa0") for head, cell in zip(heads[1:], row[1:], strict=True)
+    )
+    folded = textwrap.wrap(
+        cells, max(width, 20), initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False
+    )
+    return [row[0], *(line.replace("\xa0", " ") for line in folded)]
+
+
+def _terminal_width() -> int | None:
+    """Of the terminal that is written to, or what COLUMNS says; None for a file."""
+    if not (sys.stdout.isatty() or os.environ.get("COLUMNS", "").isdigit()):
+        return None
+    return shutil.get_terminal_size().columns

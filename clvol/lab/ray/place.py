@@ -1,0 +1,185 @@
+"""Where one camera ray meets media, as the renderer's own kernels find it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from clvol.errors import OptionError
+from clvol.lab.ray.kernels import RayKernels
+from clvol.scene.boundaries import entry_bounds
+from clvol.scene.material_facts import is_transmissive, passes_light
+from clvol.scene.materials import Null
+from clvol.scene.records import ConstVolume, Medium
+from clvol.tables.camera import CameraRays, camera_rays
+from clvol.tables.prepare import PreparedScene
+
+MOST_SURFACES = 64
+"""Surfaces that a ray may pass before it meets a medium."""
+SHOWN_RADII = 4.0
+"""Of a medium without an end so many radii of the scene are shown."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """The part of a ray inside one medium.
+
+    origin, direction : float64 (3,), the medium's entry relative to the scene's centre; unit vector.
+    distance : of the entry from the camera.  length : of the part.
+    medium : number of its entry among the scene's boundaries.  presence : how often it is present there.
+    notes : what a viewer has to know, a sentence each.
+    """
+
+    origin: np.ndarray
+    direction: np.ndarray
+    distance: float
+    length: float
+    medium: int
+    presence: int
+    notes: tuple[str, ...]
+
+
+def check_pixel(prepared: PreparedScene, x: int, y: int) -> None:
+    """OptionError for a pixel outside the picture."""
+    width, height = prepared.scene.film.window[2:]
+    if not (0 <= x < width and 0 <= y < height):
+        raise OptionError(
+            f"pixel ({x}, {y}) is outside the picture, which has {width} x {height} pixels",
+            hint=f"x is 0 to {width - 1}, from the left; y is 0 to {height - 1}, from the top",
+        )
+
+
+class _Part(NamedTuple):
+    """One medium between two distances, how often it is present there, and notes."""
+
+    medium: int
+    presence: int
+    start: float
+    end: float
+    notes: tuple[str, ...]
+
+
+def find_places(kernels: RayKernels, x: int, y: int) -> list[Place]:
+    """The media on the ray through the centre of pixel (x, y), in the order of entry, up to a surface that no
+    light passes.
+
+    Raises
+    ------
+    OptionError : the pixel is outside the picture, or its ray meets no medium.
+    """
+    prepared = kernels.prepared
+    check_pixel(prepared, x, y)
+    rays = _camera_rays(prepared)
+    origin = rays.position + (x + 0.5) * rays.dx + (y + 0.5) * rays.dy
+    direction = rays.base + (x + 0.5) * rays.base_dx + (y + 0.5) * rays.base_dy
+    direction = direction / np.linalg.norm(direction)
+    far = rays.far / float(direction @ rays.forward)
+    to_origin = float(np.linalg.norm(origin - rays.eye))
+    hits, intervals = kernels.places(origin, direction, MOST_SURFACES)
+    places = []
+    for part in _parts(prepared, hits, intervals, far):
+        end, notes = part.end, part.notes
+        if np.isinf(end):
+            end = part.start + SHOWN_RADII * prepared.radius
+            notes = (*notes, "The medium has no end; only its beginning is shown.")
+        entry = origin + part.start * direction
+        length, distance = end - part.start, to_origin + part.start
+        places.append(Place(entry, direction, distance, length, part.medium, part.presence, notes))
+    if not places:
+        raise OptionError(
+            f"the ray through pixel ({x}, {y}) meets no medium before a surface stops it"
+            if len(hits)
+            else f"the ray through pixel ({x}, {y}) meets no medium",
+            hint=pixel_hint(prepared, x, y),
+        )
+    return places
+
+
+def _camera_rays(prepared: PreparedScene) -> CameraRays:
+    everywhere = any(entry.everywhere for entry in prepared.boundaries.entries)
+    scene = prepared.scene
+    return camera_rays(scene.sensor, scene.film, prepared.centre, np.inf if everywhere else prepared.radius)
+
+
+def _parts(prepared: PreparedScene, hits: np.ndarray, intervals: np.ndarray, far: float) -> Iterator[_Part]:
+    """The parts of the ray in media, in the order of entry.
+
+    hits : float (n, 3), t, surface and whether it is entered.  intervals : float (media, 2).
+    """
+    bits, notes, start = _bits_at_start(prepared, hits), [], 0.0
+    for number in range(len(hits) + 1):
+        end = float(hits[number, 0]) if number < len(hits) else np.inf
+        presence = _presence(prepared, bits)
+        found = sorted(
+            (max(start, t0), m, min(end, t1, far))
+            for m, (t0, t1) in enumerate(intervals.tolist())
+            if presence[m] > 0 and max(start, t0) < min(end, t1, far)
+        )
+        for first, medium, last in found:
+            others = sum(t0 < last and first < t1 for t0, _, t1 in found) - 1
+            overlap = [f"{others} more media overlap this one, and are not shown."] if others else []
+            yield _Part(medium, int(presence[medium]), first, last, (*notes, *overlap))
+        if number == len(hits):
+            return
+        surface = int(hits[number, 1])
+        bsdf = prepared.surfaces.shapes[surface].bsdf
+        if not (is_transmissive(bsdf) or passes_light(bsdf)):
+            return
+        if not isinstance(bsdf, Null):
+            notes[:] = ["The ray is drawn straight through the surfaces before the medium."]
+        boundary = int(prepared.surfaces.table["boundary"][surface])
+        if boundary >= 0:
+            bits[boundary] = bool(hits[number, 2])
+        start = end
+
+
+def _bits_at_start(prepared: PreparedScene, hits: np.ndarray) -> np.ndarray:
+    """Whether the ray starts inside of each boundary: where its first crossing leads out."""
+    bits = np.zeros(len(prepared.boundaries.boundaries), bool)
+    for _, surface, enters in hits[::-1]:
+        boundary = int(prepared.surfaces.table["boundary"][int(surface)])
+        if boundary >= 0:
+            bits[boundary] = not enters
+    return bits
+
+
+def _presence(prepared: PreparedScene, bits: np.ndarray) -> np.ndarray:
+    """How often each medium is present inside these boundaries."""
+    entries = prepared.boundaries.entries
+    presence = np.array([int(e.shape is not None or e.everywhere) for e in entries], int)
+    for boundary, inside in zip(prepared.boundaries.boundaries, bits, strict=True):
+        if inside and boundary.interior >= 0:
+            presence[boundary.interior] += 1
+        if inside and boundary.exterior >= 0:
+            presence[boundary.exterior] -= 1
+    return presence
+
+
+def pixel_hint(prepared: PreparedScene, x: int, y: int) -> str:
+    """Another pixel than (x, y), towards the middle of a medium, where one is in the picture."""
+    if all(_is_empty(prepared, entry.medium) for entry in prepared.boundaries.entries):
+        return "the scene has no density anywhere"
+    rays = _camera_rays(prepared)
+    width, height = prepared.scene.film.window[2:]
+    bounds = entry_bounds(prepared.scene, prepared.boundaries)
+    for entry, (lower, upper) in zip(prepared.boundaries.entries, bounds, strict=True):
+        if _is_empty(prepared, entry.medium) or not np.isfinite([lower, upper]).all():
+            continue
+        towards = (lower + upper) / 2 - prepared.centre - rays.eye
+        a, b, depth = np.linalg.solve(np.column_stack([rays.base_dx, rays.base_dy, rays.base]), towards)
+        if not (depth > 0 and 0 <= a / depth < width and 0 <= b / depth < height):
+            continue
+        middle = int(a / depth), int(b / depth)
+        if middle != (x, y):
+            return f"try {middle[0]} {middle[1]}, towards the middle of a medium"
+    return "choose a pixel where the picture shows a medium"
+
+
+def _is_empty(prepared: PreparedScene, medium: Medium) -> bool:
+    """Whether its density is 0 everywhere."""
+    volume = medium.sigma_t
+    largest = volume.value if isinstance(volume, ConstVolume) else prepared.volumes[id(volume)].bricks.peak
+    return not np.any(largest) or not np.any(medium.scale)

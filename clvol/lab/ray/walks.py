@@ -1,0 +1,173 @@
+"""Recorded walks along one ray, and what they estimate.  Pure NumPy."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+TENTATIVE, LOOKUP, NULL, REAL, ESTIMATE = range(5)
+"""Kinds of events, as cl/ray/recorder.h numbers them."""
+UNNAMED = "the medium"
+"""What a medium without a name is called."""
+
+
+def format_estimate(mean: float, error: float) -> str:
+    """An estimate with its standard error; without where every walk gave the same."""
+    return f"{mean:.3g} ± {error:.1g}" if error > 0 else f"{mean:.3g} from every walk"
+
+
+@dataclass
+class Collision:
+    """One collision of a walk.
+
+    t : distance from the medium's entry.  rate : of tentative collisions there, nan for techniques without.
+    sigma_t : what was looked up, a number per channel; None where nothing was.
+    kind : "null", "real", or "control": real without a look-up.
+    """
+
+    t: float
+    rate: float = math.nan
+    sigma_t: tuple[float, ...] | None = None
+    kind: str = "null"
+
+
+@dataclass
+class Walk:
+    """One walk, event by event; t counts from the medium's entry.
+
+    end : t of its real collision, or None where it left the medium.
+    value : its final weight, or its estimate of transmittance, by channel.
+    lookups : t of each look-up.  weights, estimates : (t, value by channel) wherever they changed.
+    truncated : it had more events than were recorded.
+    """
+
+    end: float | None
+    value: tuple[float, ...]
+    collisions: list[Collision] = field(default_factory=list)
+    lookups: list[float] = field(default_factory=list)
+    weights: list[tuple[float, tuple[float, ...]]] = field(default_factory=list)
+    estimates: list[tuple[float, tuple[float, ...]]] = field(default_factory=list)
+    truncated: bool = False
+
+    def reach(self, channel: int) -> float | None:
+        """How far it went: to a real collision, or to where its estimate became 0; None for all the way."""
+        if self.end is not None:
+            return self.end
+        if self.value[channel] == 0.0 and self.collisions:
+            return self.collisions[-1].t
+        return None
+
+
+def read_walk(outcome: np.ndarray, events: np.ndarray) -> Walk:
+    """A walk from its outcome and its log, float32 (9,) and (n, 5), as cl/ray/walks.cl writes them."""
+    t, *value = (float(v) for v in outcome[:4])
+    walk = Walk(t if t >= 0 else None, tuple(value), truncated=bool(len(events) < outcome[8]))
+    open_collision: Collision | None = None
+    for kind, t, *numbers in events.tolist():
+        numbers = tuple(numbers)
+        if kind == TENTATIVE:
+            open_collision = Collision(t, numbers[0])
+            walk.collisions.append(open_collision)
+        elif kind == LOOKUP:
+            walk.lookups.append(t)
+            if open_collision:
+                open_collision.sigma_t = numbers
+        elif kind == NULL:
+            walk.weights.append((open_collision.t, numbers))
+        elif kind == REAL:
+            if open_collision is None:  # found without tentative collisions
+                walk.collisions.append(Collision(t, kind="real"))
+            else:
+                open_collision.kind = "control" if open_collision.sigma_t is None else "real"
+            walk.weights.append((t, numbers))
+        else:
+            walk.estimates.append((t, numbers))
+    if outcome[5] > 0 and walk.end is None and walk.collisions:
+        walk.collisions[-1].kind = "real"  # ends an all-or-nothing estimate
+    return walk
+
+
+@dataclass(frozen=True, eq=False)
+class Watched:
+    """One technique or transmittance on the ray.
+
+    family, name : of `clvol.planning.registry`; the name "analytic" stands for the closed forms of
+        homogeneous media.
+    cells : float64 (n, 10) of the majorant it walks: t, t_end, majorant, control (3), control (3) and rate of
+        residual ratio tracking; None where it walks none.
+    outcomes : float32 (walks, 9): t or -1; weight or estimate (3); tentative, real, look-ups, flaws, events.
+    walks : the first of them, event by event.
+    """
+
+    family: str
+    name: str
+    majorant: str
+    biased: bool
+    cells: np.ndarray | None
+    outcomes: np.ndarray
+    walks: list[Walk]
+
+    @property
+    def label(self) -> str:
+        """Its name, and that it is biased where it is."""
+        return f"{self.name} (biased)" if self.biased else self.name
+
+    def mean(self, column: int) -> float:
+        """Mean of a column of the outcomes."""
+        return float(self.outcomes[:, column].mean(dtype=np.float64))
+
+    def control(self, channel: int) -> np.ndarray | None:
+        """What it subtracts in each cell, (n,), or None."""
+        if self.cells is None:
+            return None
+        values = self.cells[:, (6 if self.family == "transmittance" else 3) + channel]
+        return None if np.isnan(values).all() else values
+
+    def rate(self) -> np.ndarray | None:
+        """Rate of its tentative collisions in each cell, (n,), or None where it has none."""
+        if self.cells is None or self.name == "regular":
+            return None
+        rate = self.cells[:, 9]
+        return self.cells[:, 2] if np.isnan(rate).all() else rate
+
+    def transmitted(self, channel: int) -> tuple[float, float]:
+        """Its estimate of the part's transmittance and its standard error: means, or weights that left."""
+        values = self.outcomes[:, 1 + channel].astype(np.float64)
+        if self.family == "technique":
+            values = np.where(self.outcomes[:, 0] < 0, values, 0.0)
+        return float(values.mean()), float(values.std(ddof=1) / math.sqrt(len(values)))
+
+    def free_path_density(self, edges: np.ndarray, channel: int) -> tuple[np.ndarray, np.ndarray]:
+        """Density of free paths between `edges`, weighted, and its standard error, float64 (bins,)."""
+        count, bins = len(self.outcomes), len(edges) - 1
+        t = self.outcomes[:, 0].astype(np.float64)
+        hit = (t >= edges[0]) & (t <= edges[-1])  # those that go further count as walks, not as collisions
+        weights = self.outcomes[hit, 1 + channel].astype(np.float64)
+        place = np.minimum(np.searchsorted(edges, t[hit], side="right") - 1, bins - 1)
+        mean = np.bincount(place, weights, bins) / count
+        square = np.bincount(place, weights**2, bins) / count
+        error = np.sqrt(np.maximum(square - mean**2, 0.0) / count)
+        return mean / np.diff(edges), error / np.diff(edges)
+
+    def control_depth(self, edges: np.ndarray, channel: int) -> np.ndarray:
+        """Optical depth of the control from the entry to each of `edges`; 0 where there is none."""
+        control = self.control(channel)
+        if control is None:
+            return np.zeros_like(edges)
+        ends = np.concatenate([[0.0], self.cells[:, 1]])
+        depth = np.concatenate([[0.0], np.cumsum(control * (self.cells[:, 1] - self.cells[:, 0]))])
+        return np.interp(edges, ends, depth)
+
+    def running_estimate(self, walk: Walk, edges: np.ndarray, channel: int) -> np.ndarray:
+        """What a walk's estimate of transmittance would be if the medium ended at each of `edges`."""
+        steps = [(0.0, 1.0)] + [(t, value[channel]) for t, value in walk.estimates]
+        if walk.value[channel] == 0.0 and steps[-1][1] != 0.0:  # lost at its last collision
+            last = walk.collisions[-1].t if walk.collisions else 0.0
+            steps.append((max(last, steps[-1][0]), 0.0))
+        at = np.array([t for t, _ in steps])
+        values = np.array([value for _, value in steps])
+        number = np.searchsorted(at, edges, side="right") - 1
+        since = self.control_depth(edges, channel) - self.control_depth(at, channel)[number]
+        return values[number] * np.exp(-since)

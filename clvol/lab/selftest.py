@@ -1,0 +1,282 @@
+"""Whether every way to render a scene makes the same picture of it: on the user's own scene, each combination
+of choices against all the others, with a stated rate of false alarms and the smallest bias that would show.
+
+The film is small and every combination renders as many samples, in rounds by turns, each of its own seed.
+Combinations are the covering set of `clvol.lab.combinations`: each choice is tested, not each product.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from numbers import Real
+
+import numpy as np
+
+from clvol.base.arguments import check_seed, positive, whole
+from clvol.device.device import Device, open_device
+from clvol.errors import OptionError, shown
+from clvol.lab.combinations import (
+    LIGHTS,
+    biased,
+    covering,
+    independent_seeds,
+    names_in_force,
+    options_of,
+)
+from clvol.lab.judgement import Judgement, Tested, judge
+from clvol.lab.quiet import quiet_renders
+from clvol.lab.reduced import reduced
+from clvol.lab.trials import Trial, rounds
+from clvol.picture.result import Result
+from clvol.planning.choices import Choices
+from clvol.planning.features import Features
+from clvol.rendering.session import MAX_SAMPLES
+from clvol.scene.records import Scene
+
+LEAST_ROUNDS, MOST_ROUNDS = 4, 32
+ENOUGH_ROUNDS = 2
+"""To be judged after a Ctrl-C: their differences are the noise."""
+_TRIAL_SPP = 4
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much a self-test does: pixels of the film, seconds of rendering, and the combinations beyond which
+    no more pairs of choices are sought (None: every single choice is enough)."""
+
+    pixels: int
+    seconds: float
+    combinations: int | None
+
+
+FULL, QUICK = Effort(4096, 120.0, 16), Effort(2304, 20.0, None)
+Step = Callable[[str, int, int], None]
+"""Told what is being done, how many steps of it are done, and of how many."""
+
+
+@dataclass(eq=False)
+class SelfTest:
+    """What a self-test found.
+
+    Parameters
+    ----------
+    tested : the combinations.  alpha : probability that any of a sound scene's combinations is accused.
+    size, spp, rounds : film (width, height), samples per pixel of a round, rounds of each combination.
+    pairs, all_pairs : pairs of choices that occur together in a combination, and that could.
+    left_out : biased choices, which are not tested.
+    seconds : of rendering.  kernel_seconds : of building kernels.
+    interrupted_of : rounds that there were to be, where Ctrl-C ended them early; else 0.
+    judgement : of the choices, as contrasts of those that use one with those that don't.
+    """
+
+    tested: list[Tested]
+    alpha: float
+    size: tuple[int, int]
+    spp: int
+    rounds: int
+    pairs: int
+    all_pairs: int
+    left_out: list[str]
+    seconds: float
+    kernel_seconds: float = 0.0
+    interrupted_of: int = 0
+    judgement: Judgement = field(default_factory=lambda: Judgement((), ()))
+
+    @property
+    def disagreeing(self) -> list[Tested]:
+        """The combinations that do not make the picture that the others make."""
+        return [one for one in self.tested if not one.agrees]
+
+    @property
+    def faulty(self) -> list[Tested]:
+        """The combinations with samples or walks that no sound render has."""
+        return [one for one in self.tested if one.faults]
+
+    @property
+    def passed(self) -> bool:
+        """Nothing disagrees and nothing is faulty."""
+        return not self.disagreeing and not self.faulty
+
+    @property
+    def biases(self) -> np.ndarray:
+        """Relative bias of each combination's and each choice's image mean that would have been seen, but for
+        doubtful ones; empty where there was nothing to compare."""
+        own = [t.agreement.smallest_bias for t in self.tested if t.agreement and not t.doubtful]
+        return np.array([*own, *self.judgement.limits])
+
+    @property
+    def smallest_bias(self) -> float:
+        """Relative bias that would have been seen in any of them; nan where there was nothing to compare."""
+        return float(self.biases.max()) if self.biases.size else math.nan
+
+    @property
+    def verdict(self) -> str:
+        """What was found, in plain words."""
+        parts = [contrast.why for contrast in self.judgement.guilty]
+        shared = [t for contrast in self.judgement.guilty for t in contrast.accused]
+        single = [t for t in self.disagreeing if t not in shared]
+        parts += [f"{t.called} DISAGREES with the others: {t.why}." for t in single]
+        parts += [f"{t.called} is FAULTY: {', '.join(t.faults)}." for t in self.faulty]
+        if not parts:
+            parts.append(self._praise())
+        parts += [f"Undecided: {t.called}; {t.why}, but {_doubt(t)}." for t in self.tested if t.doubtful]
+        return " ".join(parts)
+
+    def _praise(self) -> str:
+        if not any(t.images.any() for t in self.tested):
+            return f"The picture is black, in {len(self.tested)} of {len(self.tested)} combinations."
+        if len(self.tested) == 1:
+            return "There is only one way to render this scene, so nothing to compare; its samples are sound."
+        if not self.biases.size:
+            return "All combinations are too noisy to compare."
+        count = sum(not t.doubtful for t in self.tested)
+        words = (
+            f"All {count} combinations agree."
+            if count == len(self.tested)
+            else f"{count} combinations agree."
+        )
+        seen = f"{words} A bias of {100 * self.smallest_bias:.2g} % of any choice's mean would have been seen"
+        middle = float(np.median(self.biases))
+        if self.smallest_bias > 2 * middle:
+            return f"{seen}, and of {100 * middle:.2g} % of most."
+        return f"{seen}."
+
+
+def _doubt(one: Tested) -> str:
+    """Why a combination is undecided."""
+    if one.heavy:
+        return f"weights grew to {one.largest_weight:.2g}, and samples it has not seen may be the reason"
+    rare = " and finds lights by chance alone" if one.names.get(LIGHTS) == "found" else ""
+    return f"it is so noisy{rare} that a black picture would have been no alarm"
+
+
+def selftest(
+    scene: Scene,
+    *,
+    quick: bool = False,
+    seconds: float | None = None,
+    alpha: float = 1e-4,
+    seed: int = 0,
+    device: str | None = None,
+    spp: int | None = None,
+    progress: Step | None = None,
+) -> SelfTest:
+    """Render a scene in every way that must make the same picture, and test whether it does.
+
+    Parameters
+    ----------
+    scene : from `load_file` or `load_dict`; its film is made smaller, all else is as it is.
+    quick : a smaller film and fewer combinations, about a minute with the kernels built.
+    seconds : of rendering, kernels apart; 120, or 20 if quick.
+    alpha : probability that any combination of a sound scene is accused.
+    spp : samples per pixel of each of `LEAST_ROUNDS` rounds, instead of what `seconds` allow.
+    progress : called with what is done, the steps of it done, and how many there are.
+
+    Returns
+    -------
+    SelfTest.  Ctrl-C after two rounds or more ends them, and those that are complete are judged.
+
+    Raises
+    ------
+    OptionError, SceneError, VolumeError, DeviceError : an alpha, scene, volume or device that won't do.
+    KeyboardInterrupt : Ctrl-C before two rounds were complete.
+    """
+    if not isinstance(scene, Scene):
+        raise OptionError(f"selftest takes a Scene, not {type(scene).__name__}", hint="use load_file")
+    if not isinstance(alpha, Real) or not 0 < alpha < 1:
+        raise OptionError(f"alpha {shown(alpha)} is no probability", hint="give a small one, such as 1e-4")
+    if seconds is not None:
+        positive("", seconds, " of seconds")
+    seed = check_seed(seed)
+    if spp is not None and not 1 <= whole("spp", spp) <= MAX_SAMPLES:
+        raise OptionError(f"spp={spp} cannot be rendered", hint=f"give 1 to {MAX_SAMPLES}")
+    effort = QUICK if quick else FULL
+    tell = progress or (lambda what, done, total: None)
+    small, opened = reduced(scene, effort.pixels), open_device(device)
+    tell("kernels", 0, 1)
+    trials = [Trial.open(opened, small, Choices())]
+    with quiet_renders():
+        pairs, all_pairs = open_covering(trials, opened, small, effort, tell)
+        started = time.perf_counter()
+        seeds, count = independent_seeds(seed, "selftest"), LEAST_ROUNDS
+        if spp is None:
+            spp, count = affordable(trials, seconds or effort.seconds, seeds)
+        tested = _rendered(trials, spp, count, seeds, tell)
+    elapsed, building = time.perf_counter() - started, sum(t.session.kernel_seconds for t in trials)
+    for one in tested:
+        one.found = brightest_light(small) / spp if one.names[LIGHTS] == "found" else 0.0
+    judgement, size, had = judge(tested, alpha), small.film.window[2:], len(tested[0].images)
+    return SelfTest(
+        tested,
+        alpha,
+        size,
+        spp,
+        had,
+        pairs,
+        all_pairs,
+        biased(),
+        elapsed,
+        building,
+        count if had < count else 0,
+        judgement,
+    )
+
+
+def brightest_light(scene: Scene) -> float:
+    """Largest radiance, in any channel, of the lights that a path can find by chance."""
+    surfaces = [shape.emission for shape in scene.shapes if shape.emission is not None]
+    around = [light.radiance for light in scene.emitters if hasattr(light, "radiance")]
+    return max((float(np.max(radiance)) for radiance in (*surfaces, *around)), default=0.0)
+
+
+def open_covering(
+    trials: list[Trial], device: Device, scene: Scene, effort: Effort, tell: Step
+) -> tuple[int, int]:
+    """Add to what `auto` comes to the combinations that cover every choice; the pairs had, and possible."""
+    found = covering(Features.from_scene(scene), names_in_force(trials[0].session), effort.combinations)
+    total = 1 + len(found.combinations)
+    need = total * trials[0].session.wavefront.bytes
+    if need > device.info.global_memory / 2:
+        raise OptionError(
+            f"a self-test of this scene keeps {need / 2**30:.1f} GiB on the device, over half of what it has",
+            hint="use volumes of a lower resolution",
+        )
+    for names in found.combinations:
+        tell("kernels", len(trials), total)
+        trials.append(Trial.open(device, scene, Choices(**names)))
+    tell("kernels", total, total)
+    return found.pairs, found.all_pairs
+
+
+def affordable(trials: list[Trial], seconds: float, seeds: Iterator[int]) -> tuple[int, int]:
+    """Samples per pixel of a round (a power of two) and rounds, so that all trials take about `seconds`."""
+    cost = sum(t.render(next(seeds), _TRIAL_SPP).stats["seconds"]["render"] for t in trials) / _TRIAL_SPP
+    in_all = max(seconds / cost, 1.0)
+    spp = 2 ** max(0, math.floor(math.log2(in_all / (2 * LEAST_ROUNDS))))
+    return spp, int(np.clip(in_all / spp, LEAST_ROUNDS, MOST_ROUNDS))
+
+
+def _rendered(trials: list[Trial], spp: int, count: int, seeds: Iterator[int], tell: Step) -> list[Tested]:
+    """The combinations with `count` rounds each, or those complete at a Ctrl-C, of which two are enough."""
+    tested = [Tested(options_of(t), names_in_force(t.session), t.session.needs_bound()) for t in trials]
+    rendered: list[list[Result]] = []
+    tell("rounds", 0, count)
+    try:
+        for results in itertools.islice(rounds(trials, [spp] * len(trials), seeds), count):
+            rendered.append(results)
+            tell("rounds", len(rendered), count)
+    except KeyboardInterrupt:
+        if len(rendered) < ENOUGH_ROUNDS:
+            raise
+    for one, results in zip(tested, zip(*rendered, strict=True), strict=True):
+        one.images = np.stack([r.image for r in results])
+        one.totals = {
+            name: sum(r.stats[name] for r in results)
+            for name in ("non_finite", "walks_exhausted", "majorant_violations", "lookups")
+        }
+        one.largest_weight = max(r.stats["largest_weight"] for r in results)
+    return tested

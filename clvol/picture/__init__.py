@@ -1,0 +1,1 @@
+"""Pictures: what a film's sums estimate, results, and their files.  Knows no device."""

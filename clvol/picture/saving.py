@@ -1,0 +1,91 @@
+"""A result as files: under the names it should have, and somewhere where that cannot be."""
+
+from __future__ import annotations
+
+import logging
+import secrets
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from clvol.base.output_files import (
+    StrPath,
+    check_file,
+    check_room,
+    kept_elsewhere,
+    output_suffix,
+    real,
+    write_file,
+)
+from clvol.errors import Error, OptionError
+from clvol.picture import image_io
+
+if TYPE_CHECKING:
+    from clvol.picture.result import Result
+
+log = logging.getLogger("clvol")
+SUFFIXES = (".exr", ".png")
+_SQUEEZED = 32
+"""By how much compression may shrink a picture; noise hardly does by 2."""
+
+
+def check_picture(path: StrPath, exposure: float = 0.0) -> None:
+    """Raise OptionError now for what `save` would refuse after a long render."""
+    output_suffix(path, SUFFIXES)
+    image_io.check_exposure(exposure)
+    check_file(path)
+
+
+def check_disk(path: StrPath, pixels: int, aovs: int) -> None:
+    """OptionError where a picture of so many pixels cannot fit on the disk, a warning where it may not."""
+    planes = 8 + 3 * aovs  # colours, their variances, look-ups and samples
+    most = pixels * (4 * planes if output_suffix(path, SUFFIXES) == ".exr" else 3)
+    folder = real(path).parent
+    try:
+        check_room(folder, str(path), most)
+    except OptionError:
+        check_room(folder, str(path), most // _SQUEEZED)
+        from clvol.scene.describe import format_bytes
+
+        log.warning("%s: '%s' has no room for the %s it may take", path, folder, format_bytes(most))
+
+
+def encode(result: Result, suffix: str, exposure: float = 0.0) -> bytes:
+    """The whole file: a tone-mapped .png, or an .exr with picture, variance and every AOV."""
+    if suffix == ".png":
+        return image_io.encode_png(result.image, result.metadata, exposure)
+    channels: dict[str, np.ndarray] = {}
+    for name, image in [("", result.image), ("variance", result.variance), *result.aovs.items()]:
+        channels |= image_io.split_channels(name, image)
+    return image_io.encode_exr(channels, result.metadata | {"dof": result.dof})
+
+
+def save_all(result: Result, paths: Sequence[StrPath], exposure: float = 0.0) -> dict[StrPath, Error]:
+    """Write every picture that can be written; return what went wrong with the others, and where the picture
+    is then: in another of the files, or in one with a name of its own."""
+    failed: dict[StrPath, str] = {}
+    whole = ""
+    for path in paths:
+        try:
+            suffix = output_suffix(path, SUFFIXES)
+            write_file(path, encode(result, suffix, exposure))
+            whole = whole or (str(path) if suffix == ".exr" else "")
+        except (Error, OSError, MemoryError) as error:
+            failed[path] = getattr(error, "what", "") or str(error) or "out of memory"
+    if not failed:
+        return {}
+    whole = whole or _keep(result, next(iter(failed)))
+    hint = f"the picture is kept as {whole}" if whole else "and there is no other place to keep the picture"
+    return {path: OptionError(what, str(path), hint) for path, what in failed.items()}
+
+
+def _keep(result: Result, path: StrPath) -> str:
+    """Where the picture is instead, as .exr; "" if there is no room for it anywhere."""
+
+    try:
+        data = encode(result, ".exr")
+    except (Error, OSError, MemoryError):
+        return ""
+    name = f"clvol-{secrets.token_hex(4)}.exr"
+    return str(kept_elsewhere(path, name, lambda place: write_file(place, data)) or "")

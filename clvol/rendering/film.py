@@ -1,0 +1,125 @@
+"""The film on the device: what finished samples add up to, pixel by pixel.
+
+A render has one; a pilot that decides how many samples each pixel gets has another, so that none of its
+samples is in the picture.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pyopencl as cl
+
+from clvol import layout
+from clvol.device.device import Device
+from clvol.picture.estimate import Estimate, Moments, Replicates, Uneven
+from clvol.planning.config import KernelConfig
+from clvol.tables.sobol import samples_of_each
+
+_READ_PIXELS = 1 << 18
+HOST_BYTES = 250
+"""Bytes a pixel that making a picture of the film takes at most, beside the film itself."""
+
+
+class Film:
+    """Sums over the samples of one seed.
+
+    Parameters
+    ----------
+    seed : low and high word of the seed of its samples.
+    pixels : of the picture.
+    """
+
+    def __init__(self, device: Device, config: KernelConfig, pixels: int, seed: tuple[int, int]) -> None:
+        self.device, self.config, self.pixels, self.seed = device, config, pixels, seed
+        self.path_counts = layout.path_counts(config)
+        self.firsts = layout.first_hit_fields(config)
+        self.peaks = 1 + layout.shows_weight(config)
+        sizes = {
+            "film": 8 * (config.randomizations or 2) * config.channels * pixels,
+            "film_peaks": 4 * self.peaks * pixels,
+        }
+        if self.path_counts:
+            sizes["film_counts"] = 8 * len(self.path_counts) * pixels
+        if self.firsts:
+            sizes["film_firsts"] = 8 * len(self.firsts) * pixels
+        what, hint = f"a film of {pixels} pixels", "render fewer pixels"
+        self.buffers = {name: device.memory.allocate(size, what, hint) for name, size in sizes.items()}
+        if device.memory.shared:
+            device.memory.require(HOST_BYTES * pixels, f"a picture of {pixels} pixels", hint)
+        self.clear(seed)
+
+    def clear(self, seed: tuple[int, int]) -> None:
+        """Forget every sample; the next ones are another seed's."""
+        self.seed = seed
+        for buffer in self.buffers.values():
+            cl.enqueue_fill_buffer(self.device.queue, buffer, np.uint32(0), 0, buffer.size)
+        listed = self.pixels if self.config.pixel_list else 0
+        self.samples = np.zeros(listed, np.int64)  # of each pixel, where they are not the same of all
+        self.slot_totals = dict.fromkeys(layout.slot_fields(self.config), 0.0)
+
+    def _read(self, name: str, shape: tuple[int, ...], dtype: type) -> np.ndarray:
+        array = np.empty(shape, dtype)
+        cl.enqueue_copy(self.device.queue, array, self.buffers[name], is_blocking=True)
+        return array
+
+    def _sums(self) -> np.ndarray:
+        """Of each randomisation, or of samples and squares; float64 (parts, pixels, channels).
+
+        Read a part of the pixels at a time: the device's pairs of floats take as much as the sums.
+        """
+        parts, channels = self.config.randomizations or 2, self.config.channels
+        sums = np.empty((parts, self.pixels, channels))
+        for first in range(0, self.pixels, _READ_PIXELS):
+            count = min(_READ_PIXELS, self.pixels - first)
+            pairs = np.empty((count, parts, channels, 2), np.float32)
+            at = first * parts * channels * 8
+            cl.enqueue_copy(self.device.queue, pairs, self.buffers["film"], src_offset=at, is_blocking=True)
+            np.add(
+                pairs[..., 0].swapaxes(0, 1),
+                pairs[..., 1].swapaxes(0, 1),
+                out=sums[:, first : first + count],
+                dtype=np.float64,
+            )
+        return sums
+
+    def estimate(self, first: int, count: int) -> Estimate:
+        """What the samples `first` to `first + count`, all rendered, add up to; (pixels, channels)."""
+        return self._estimate(self._sums(), first, count)
+
+    def _estimate(self, sums: np.ndarray, first: int, count: int) -> Moments | Replicates:
+        if self.config.randomizations:
+            return Replicates(sums, samples_of_each(first, count))
+        return Moments(sums[0], sums[1], count)
+
+    def uneven_estimate(self) -> Uneven:
+        """What the samples, from 0 on as many as each pixel has, add up to; (pixels, channels)."""
+        sums = self._sums()
+        mean, variance = np.zeros(sums.shape[1:]), np.full(sums.shape[1:], np.inf)
+        least = []
+        for count in np.unique(self.samples[self.samples > 0]):
+            at = self.samples == count
+            estimate = self._estimate(sums[:, at], 0, int(count))
+            mean[at], variance[at] = estimate.mean_and_variance()
+            least.append(estimate.dof)
+        return Uneven(mean, variance, self.samples.copy(), min(least, default=0))
+
+    def counts(self) -> dict[str, np.ndarray]:
+        """What walks counted so far, by name, uint64 (pixels,)."""
+        if not self.path_counts:
+            return {}
+        counts = self._read("film_counts", (self.pixels, len(self.path_counts)), np.uint64)
+        return {name: counts[:, n] for n, name in enumerate(self.path_counts)}
+
+    def first_hits(self) -> dict[str, np.ndarray]:
+        """Sums over the paths of what they first met, by field, float64 (pixels,)."""
+        if not self.firsts:
+            return {}
+        film = self._read("film_firsts", (self.pixels, len(self.firsts), 2), np.float32).astype(np.float64)
+        return {name: film[:, n, 0] + film[:, n, 1] for n, name in enumerate(self.firsts)}
+
+    def peaks_by_pixel(self) -> dict[str, np.ndarray]:
+        """Largest absolute sample of each pixel, and weight where a picture shows it; float32 (pixels,)."""
+        peaks = self._read("film_peaks", (self.pixels, self.peaks), np.float32)
+        return {
+            name: peaks[:, n] for n, name in enumerate(("largest_sample", "largest_weight")[: self.peaks])
+        }

@@ -1,0 +1,204 @@
+"""What a session has to show: its film as a Result, with pictures of what it cost and statistics."""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from clvol.picture.estimate import Estimate
+from clvol.picture.result import Result, said_ranges
+from clvol.planning import registry
+from clvol.scene.digest import scene_digest
+from clvol.tables.apart import extinction_ratio
+from clvol.version import __version__
+
+if TYPE_CHECKING:
+    from clvol.rendering.session import Session
+
+log = logging.getLogger("clvol")
+LARGE_WEIGHT = 100.0
+"""Paths that weigh so much more than others are rare: few samples do not show them."""
+
+
+def make_result(session: Session, first: int, count: int) -> Result:
+    """The film as a Result; of samples `first` to `first + count`, or of as many as each listed pixel got."""
+    film, window = session.wavefront.film, session.prepared.scene.film.window
+    shape = window[3], window[2]
+    if session.config.pixel_list:
+        estimate, samples = film.uneven_estimate(), film.samples
+    else:
+        estimate, samples = film.estimate(first, count), np.full(film.pixels, count)
+    stats = statistics(session, int(samples.sum()))
+    pictures = _pictures(session, samples, estimate)
+    aovs = {name: values.reshape(*shape, *values.shape[1:]) for name, values in pictures.items()}
+    result = Result.from_estimate(
+        estimate.reshaped(*shape, 3), (first, count), aovs, stats, _metadata(session, first, samples)
+    )
+    _warn_of_unseen(session, result)
+    return result
+
+
+def _warn_of_unseen(session: Session, result: Result) -> None:
+    """Say where the samples do not show the noise that there may be."""
+    features = session.config.features
+    if result.stats["largest_sample"] == 0 and (features.emitters or features.emission):
+        log.warning("no sample met any light: the picture may be black by chance, its noise is unknown")
+    elif result.met_nothing and not result.variance.any():
+        log.warning(
+            "no path met anything in the media, and all samples are the same: what is rare there has not "
+            "been seen, and the noise is only a bound"
+        )
+
+
+def _metadata(session: Session, first: int, samples: np.ndarray) -> dict[str, Any]:
+    """How the picture was made."""
+    scene, needs, biased = session.prepared.scene, session.prepared.needs, session.biased()
+    even = samples.min() == samples.max()
+    return {
+        "scene": scene.source,
+        "digest": scene_digest(scene),
+        **session.choices(),
+        **({"majorant_scale": needs.scale} if needs.scale != 1 else {}),
+        **({"biased": ", ".join(biased), "step": session.step or "voxel"} if biased else {}),
+        **(
+            {"channels_apart": f"1 : {extinction_ratio(session.prepared):.3g}"}
+            if session.mixes_far_channels()
+            else {}
+        ),
+        "spp": int(samples[0]) if even else round(float(samples.mean()), 3),
+        **said_ranges(((first, int(samples.max())),)),
+        "seed": session.seed,
+        "device": session.device.description,
+        "version": __version__,
+        "seconds": round(session.seconds, 4),
+    }
+
+
+def _pictures(session: Session, samples: np.ndarray, estimate: Estimate) -> dict[str, np.ndarray]:
+    """Look-ups and what `aov` asks for: means per sample, and the largest weight; float32 (pixels[, 3])."""
+    film, config = session.wavefront.film, session.config
+    sums, peaks, nothing = film.counts(), film.peaks_by_pixel(), np.zeros(film.pixels)
+    counts = {name: total / np.maximum(samples, 1) for name, total in sums.items()}
+    found = {}
+    for name in dict.fromkeys(("lookups", *config.aov, *(["samples"] if config.pixel_list else []))):
+        if name in registry.FIRST_HIT:
+            values = _first_hit(session, name, np.maximum(samples, 1) * config.jobs_per_sample)
+        elif name == "largest_weight":
+            values = peaks.get(name, np.ones(film.pixels))
+        elif name == "null":
+            values = counts["tentative"] - counts["real"] if "tentative" in counts else nothing
+        elif name == "samples":
+            values = samples
+        elif name == "variance":
+            values = _variance(estimate) * samples
+        elif name == "efficiency":
+            values = _efficiency(session, sums, samples, _variance(estimate))
+        else:
+            values = counts.get(name, nothing)
+        found[name] = np.asarray(values, np.float32)
+    return found
+
+
+def _variance(estimate: Estimate) -> np.ndarray:
+    """Of each pixel's mean, the mean of the channels', float64 (pixels,)."""
+    return estimate.mean_and_variance()[1].mean(axis=-1)
+
+
+def _efficiency(
+    session: Session, sums: dict[str, np.ndarray], samples: np.ndarray, variance: np.ndarray
+) -> np.ndarray:
+    """1 / (variance · seconds) of each pixel, 0 where that is unknown; float64 (pixels,).
+
+    The device keeps no clock for a pixel: the seconds of the stages that walk are dealt out by look-ups and
+    cells crossed, the others by samples.
+    """
+    film, seconds = session.wavefront.film, session.wavefront.seconds
+    walking = sum(seconds.get(stage, 0.0) for stage in ("medium_sample", "shadow_transmittance"))
+    work = sum((sums[name] for name in ("lookups", "cells") if name in sums), np.zeros(film.pixels))
+    even = samples / samples.sum()
+    share = work / work.sum() if work.sum() > 0 else even
+    spent = walking * share + (sum(seconds.values()) - walking) * even
+    cost = variance * spent
+    known = np.isfinite(cost) & (cost > 0)
+    return np.divide(1.0, cost, out=np.zeros(film.pixels), where=known)
+
+
+def _first_hit(session: Session, name: str, paths: np.ndarray) -> np.ndarray:
+    """A picture of what camera paths first met: means over `paths` paths, float64 (pixels[, 3])."""
+    sums = session.wavefront.film.first_hits()
+    channels = registry.FIRST_HIT[name][1]
+    means = np.stack([sums[f"{name}_{c}"] / paths for c in range(channels)], axis=1)
+    if name == "position":  # the device's are relative to the centre
+        means += (sums["met"] / paths)[:, None] * session.prepared.centre
+    return means if channels > 1 else means[:, 0]
+
+
+def statistics(session: Session, samples: int) -> dict[str, Any]:
+    """What `samples` samples, over all pixels, cost and met; what went wrong is logged."""
+    wavefront, film = session.wavefront, session.wavefront.film
+    slots = wavefront.slot_statistics()
+    peaks = {n: float(p.max(initial=0.0)) for n, p in film.peaks_by_pixel().items()}
+    counts = {n: int(slots.get(n, 0)) for n in registry.COUNTS}
+    counts |= {n: int(c.sum()) for n, c in film.counts().items()}
+    paths = samples * session.config.jobs_per_sample
+    stats = {
+        "paths": paths,
+        "lookups": counts["lookups"],
+        "tentative_collisions": counts["tentative"],
+        "null_collisions": counts["tentative"] - counts["real"],
+        "real_collisions": counts["real"],
+        "cells_crossed": counts["cells"],
+        "seconds": {
+            "setup": session.setup_seconds,
+            "kernels": session.kernel_seconds,
+            "render": session.seconds,
+            **wavefront.seconds,
+        },
+        "launches": wavefront.launches,
+        "waves": wavefront.waves,
+        "slots": wavefront.pool.slots,
+        "bytes_per_slot": 4 * len(wavefront.fields),
+        "non_finite": wavefront.non_finite(),
+        "majorant_violations": counts["violations"],
+        "walks_exhausted": int(slots.get("exhausted", 0)),
+        "largest_weight": max(1.0, slots.get("largest_weight", 0.0), peaks.get("largest_weight", 0.0)),
+        "largest_sample": peaks["largest_sample"],
+        "paths_cut_by_max_depth": int(slots.get("cut", 0)),
+        "energy_lost_to_caps": slots.get("cut_energy", 0.0) / max(paths, 1),
+    }
+    _warn(session, stats)
+    log.info(
+        "set-up (volumes, majorants, kernels)  %8.3f seconds, %.3f of them for kernels",
+        session.setup_seconds,
+        session.kernel_seconds,
+    )
+    for stage, seconds in wavefront.seconds.items():
+        log.info("stage %-20s %8.3f seconds", stage, seconds)
+    return stats
+
+
+def _warn(session: Session, stats: dict[str, Any]) -> None:
+    """Log what leaves the picture wrong, or noisier than it looks."""
+    features = session.config.features
+    if features.heterogeneous and not stats["lookups"] and not features.homogeneous:
+        log.warning("no path met any density: are the transforms right?")
+    for name in ("non_finite", "walks_exhausted"):
+        if stats[name]:
+            log.warning("%s: %d", name.replace("_", " "), stats[name])
+    if stats["majorant_violations"]:
+        log.warning(
+            "%d of %d look-ups were above their majorant: %s",
+            stats["majorant_violations"],
+            stats["lookups"],
+            "the picture is biased"
+            if session.needs_bound()
+            else "these techniques stay unbiased, at more noise",
+        )
+    if stats["largest_weight"] > LARGE_WEIGHT:
+        log.warning(
+            "weights grew to %.2g: the picture is noisier than its variance says; raise majorant_scale, "
+            "use probability history, or a technique without weights",
+            stats["largest_weight"],
+        )

@@ -1,0 +1,366 @@
+"""The wavefront: path slots, queues, and the schedule that keeps the device busy.
+
+Jobs (one sample of one pixel each, or one channel of it) are numbered; a free slot takes the next number.
+A *pass* is a run of jobs that gives every pixel the same number of samples; its results stand in a ring
+buffer and are added to the film once all of them have arrived, in the order of the samples.  Several passes
+are in flight together, so that no slot waits for a pass to end.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pyopencl as cl
+
+from clvol import layout
+from clvol.device.device import Device, set_arguments
+from clvol.errors import OptionError
+from clvol.planning.config import KernelConfig
+from clvol.rendering.film import Film
+
+log = logging.getLogger("clvol")
+NO_JOB = 0xFFFFFFFF
+_NEXT_JOB, _JOB_LIMIT, _NON_FINITE, _DONE = (layout.enum("CONTROL", n) for n in layout.ENUMS["CONTROL"])
+_MAX_ROUND_JOBS = 1 << 31
+_HARVEST_SECONDS = 2.0
+"""Statistics of the slots are collected at least this often: their 32-bit counters must not run over."""
+_BATCH_SECONDS = 0.02
+"""Waves are launched in batches of about this length; between batches the host reads the counters."""
+_PATIENCE_SECONDS = 10.0
+"""How long paths in flight are waited for once the render is to end: hardly any path takes as long, but some
+never end.  Whole passes that then lack a path are dropped."""
+_FIRST_PATIENCE_SECONDS = 30.0
+"""The same where no pass is finished yet: without one there is no picture."""
+
+
+@dataclass(frozen=True)
+class Pool:
+    """How many paths are in flight and how many jobs a pass holds (at least one sample per pixel)."""
+
+    slots: int
+    pass_jobs: int
+    ring_passes: int = 4
+
+    @classmethod
+    def for_device(cls, device: Device, config: KernelConfig, slots: int | None = None) -> Pool:
+        """Pool for a device; `slots` is rounded up to whole groups."""
+        if slots is None:
+            slots = 8192 if device.is_cpu else 1 << 20
+        if not 1 <= slots <= 1 << 26:
+            raise OptionError(f"a pool of {slots} paths", hint="give 1 to 67108864")
+        groups = max(1, -(-slots // config.group_slots))
+        slots = groups * config.group_slots
+        return cls(slots, pass_jobs=4 * slots)
+
+
+@dataclass
+class Progressed:
+    """What the schedule reports between batches."""
+
+    samples_done: int
+    seconds: float
+
+
+class Wavefront:
+    """Runs one render: buffers of state, queues and film on one device, and the launch loop.
+
+    Parameters
+    ----------
+    kernels : stage name to kernel, `accumulate` included.
+    buffers : scene buffers by argument name.
+    render : the Render record, without its schedule fields.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        config: KernelConfig,
+        kernels: dict[str, cl.Kernel],
+        buffers: dict[str, cl.Buffer],
+        render: np.ndarray,
+        pool: Pool,
+    ) -> None:
+        self.device, self.config, self.kernels, self.pool = device, config, kernels, pool
+        self.render = render
+        self.pixels = int(render["film_size"][0, 0]) * int(render["film_size"][0, 1])
+        self.buffers: dict[str, cl.Buffer] = {}
+        self.list_pixels(None)
+        self.groups = pool.slots // config.group_slots
+        self.fields = layout.path_fields(config)
+        self.film = self.new_film(tuple(int(word) for word in render["seed"][0]))
+        self._harvested = time.perf_counter()
+        self.stride = pool.slots + 16  # off the power of two, or all fields of a slot share a cache set
+        self.seconds = dict.fromkeys((*config.stages, "accumulate"), 0.0)
+        self.launches = self.waves = 0
+        self._allocate(buffers)
+
+    def _allocate(self, scene_buffers: dict[str, cl.Buffer]) -> None:
+        # of fewer pixels a pass may hold more jobs than of all, though not more than this
+        ring_jobs = max(self.pool.pass_jobs, self.sample_jobs) * self.pool.ring_passes
+        sizes = {
+            "render": self.render.nbytes,
+            "state": 4 * len(self.fields) * self.stride,
+            "queues": 4 * len(layout.ENUMS["QUEUE"]) * self.pool.slots,
+            "counts": 4 * layout.COUNTER_STRIDE * self.groups,
+            "control": 4 * (_DONE + self.pool.ring_passes),
+            "results": 4 * self.config.channels * ring_jobs // self.config.jobs_per_sample,
+        }
+        if self.film.firsts:
+            sizes["result_firsts"] = 4 * len(self.film.firsts) * ring_jobs
+        if self.config.pixel_list:
+            sizes["pixel_list"] = 8 * self.pixels
+        if stride := layout.counts_per_path(self.config):
+            sizes["result_counts"] = 4 * stride * ring_jobs
+        self.buffers = {name: self._buffer(size) for name, size in sizes.items()} | scene_buffers
+        self.bytes = sum(sizes.values()) + sum(b.size for b in scene_buffers.values())
+        state = np.zeros((len(self.fields), self.stride), np.uint32)
+        state[[f.name for f in self.fields].index("job")] = NO_JOB
+        self._write("state", state)
+        self._write("control", np.zeros(_DONE + self.pool.ring_passes, np.uint32))
+        values = [
+            np.uint32(self.stride) if argument.name == "slot_stride" else self.buffers[argument.name]
+            for argument in layout.arguments(self.config)
+        ]
+        for stage in self.config.stages:
+            set_arguments(self.kernels[stage], *values)
+        self.list_pixels(None)
+
+    def restart(self, seed: tuple[int, int]) -> None:
+        """Forget every sample and what was counted; the next run draws the random numbers of another seed."""
+        self._harvest()
+        self.film.clear(seed)
+        self._write("control", np.zeros(_DONE + self.pool.ring_passes, np.uint32))
+        self._reset_clocks()
+
+    def new_film(self, seed: tuple[int, int]) -> Film:
+        """An empty film for samples of another seed."""
+        return Film(self.device, self.config, self.pixels, seed)
+
+    def use_film(self, film: Film) -> None:
+        """Go on with another film, which the next run adds to."""
+        self._harvest()
+        self.film = film
+
+    def _reset_clocks(self) -> None:
+        self.seconds = dict.fromkeys(self.seconds, 0.0)
+        self.launches = self.waves = 0
+
+    def _buffer(self, size: int) -> cl.Buffer:
+        return self.device.memory.allocate(size, f"a film of {self.pixels} pixels", "render fewer pixels")
+
+    def _write(self, name: str, array: np.ndarray, offset: int = 0) -> None:
+        cl.enqueue_copy(self.device.queue, self.buffers[name], array, dst_offset=offset, is_blocking=True)
+
+    def list_pixels(self, pixels: np.ndarray | None) -> None:
+        """What the next run renders: these pixels, each from the first sample on that its film lacks.
+
+        int (n,), or None for all; a list needs kernels with `config.pixel_list`.
+        """
+        self.listed = self.pixels if pixels is None else len(pixels)
+        self.sample_jobs = self.listed * self.config.jobs_per_sample  # of one sample of each
+        self.pass_samples = max(1, self.pool.pass_jobs // self.sample_jobs)
+        if self.config.pixel_list and self.buffers:
+            chosen = np.arange(self.pixels) if pixels is None else pixels
+            entries = np.stack([chosen, self.film.samples[chosen]], axis=1).astype(np.uint32)
+            self._write("pixel_list", entries)
+
+    def run(
+        self,
+        first: int,
+        count: int,
+        should_stop: Callable[[], int],
+        report: Callable[[Progressed], None],
+    ) -> int:
+        """Render samples `first` .. `first + count` of every pixel listed; return how many were done.
+
+        `should_stop` is asked between batches.  Once it says 1 no new pass is begun, and the passes in
+        flight are finished, not dropped (dropping favours short paths), as long as patience lasts; at 2 only
+        what is finished is kept.
+        """
+        done = 0
+        start = time.perf_counter()
+        self._stopping_since: float | None = None
+        per_round = max(1, _MAX_ROUND_JOBS // (self.pass_samples * self.sample_jobs)) * self.pass_samples
+        while done < count and not (done and should_stop()):
+            part = min(count - done, per_round)
+            finished = self._run_round(
+                first + done,
+                part,
+                should_stop,
+                lambda n, base=done: report(Progressed(base + n, time.perf_counter() - start)),
+                done > 0,
+            )
+            done += finished
+            if finished < part:
+                break
+        return done
+
+    def _run_round(
+        self,
+        first: int,
+        count: int,
+        should_stop: Callable[[], int],
+        report: Callable[[int], None],
+        earlier: bool,
+    ) -> int:
+        """One numbering of jobs: fewer than 2³¹ of them; `earlier`: a round before has samples."""
+        passes = -(-count // self.pass_samples)
+        samples = [self.pass_samples] * passes
+        samples[-1] = count - (passes - 1) * self.pass_samples
+        pass_jobs = self.pass_samples * self.sample_jobs
+        self._start_round(first, pass_jobs, passes - 1, samples[-1])
+        begun = finished = 0
+        waves = 1
+        while True:
+            urgency = should_stop() if begun else 0
+            allowed = begun if urgency else min(passes, finished + self.pool.ring_passes)
+            limit = sum(samples[:allowed]) * self.sample_jobs
+            self._write("control", np.array([limit], np.uint32), 4 * _JOB_LIMIT)
+            launched, elapsed = self._launch(waves)
+            waves = int(np.clip(launched * _BATCH_SECONDS / max(elapsed, 1e-6), 1, max(2 * launched, 4)))
+            if time.perf_counter() - self._harvested > _HARVEST_SECONDS:
+                self._harvest()
+            control = self._read_control()
+            begun = min(allowed, -(-int(control[_NEXT_JOB]) // pass_jobs))
+            while finished < begun:
+                place = finished % self.pool.ring_passes
+                if control[_DONE + place] != samples[finished] * self.sample_jobs:
+                    break
+                self._accumulate(place, samples[finished], first + finished * self.pass_samples)
+                finished += 1
+                report(sum(samples[:finished]))
+            if finished == passes or (finished == begun and begun and should_stop()):
+                return sum(samples[:finished])
+            if self._out_of_patience(urgency, finished > 0 or earlier):
+                self._abandon(begun - finished)
+                return sum(samples[:finished])
+
+    def _out_of_patience(self, urgency: int, some_finished: bool) -> bool:
+        """Whether paths in flight are no longer waited for."""
+        if urgency == 0:
+            return False
+        now = time.perf_counter()
+        if self._stopping_since is None:
+            self._stopping_since = now
+        patience = _PATIENCE_SECONDS if some_finished else _FIRST_PATIENCE_SECONDS
+        return urgency > 1 or now - self._stopping_since > patience
+
+    def _abandon(self, passes: int) -> None:
+        """Give up the paths in flight, and with them the passes that they belong to."""
+        log.warning("dropped %d unfinished passes, whose paths did not end", passes)
+        fresh = {"job": NO_JOB, "leg": 0, "shadow_leg": 0}
+        for row, field in enumerate(self.fields):
+            if field.name in fresh:
+                values = np.full(self.stride, fresh[field.name], np.uint32)
+                self._write("state", values, values.nbytes * row)
+
+    def warm_up(self) -> None:
+        """Run every kernel once with nothing to do: some drivers (PoCL) compile at the first launch, which
+        is part of setting up and not of the render."""
+        self._start_round(0, self.pass_samples * self.sample_jobs, 0, self.pass_samples)
+        self._launch(1)
+        self._accumulate(0, 0, 0)
+        self._reset_clocks()
+
+    def _start_round(self, first: int, pass_jobs: int, last_pass: int, last_samples: int) -> None:
+        self.render["seed"] = self.film.seed
+        self.render["first_sample"], self.render["pass_samples"] = first, self.pass_samples
+        self.render["pass_jobs"], self.render["ring_passes"] = pass_jobs, self.pool.ring_passes
+        self.render["last_pass"], self.render["last_samples"] = last_pass, last_samples
+        self._write("render", self.render)
+        control = np.zeros(_DONE + self.pool.ring_passes, np.uint32)
+        control[_NON_FINITE] = self.non_finite()  # counts over all rounds
+        self._write("control", control)
+        counts = np.zeros((self.groups, layout.COUNTER_STRIDE), np.uint32)
+        counts[:, len(layout.ENUMS["QUEUE"])] = self.config.group_slots  # all slots idle
+        self._write("counts", counts)
+
+    def _launch(self, waves: int) -> tuple[int, float]:
+        """Run up to `waves` waves; return how many and the seconds they took, which are booked by stage.
+
+        One wave is queued behind the one that runs, so that a batch that turns out long can be cut.
+        """
+        queue, size = self.device.queue, (self.groups * self.config.local_size,)
+        local = (self.config.local_size,)
+        launched: list[list[cl.Event]] = []
+        start = time.perf_counter()
+        while len(launched) < waves:
+            launched.append(
+                [
+                    cl.enqueue_nd_range_kernel(queue, self.kernels[stage], size, local)
+                    for stage in self.config.stages
+                ]
+            )
+            if len(launched) > 1:
+                launched[-2][-1].wait()
+                if time.perf_counter() - start > 2 * _BATCH_SECONDS:
+                    break
+        launched[-1][-1].wait()
+        self.launches += len(launched) * len(self.config.stages)
+        self.waves += len(launched)
+        total = 0.0
+        for events in launched:
+            for stage, event in zip(self.config.stages, events, strict=True):
+                seconds = 1e-9 * (event.profile.end - event.profile.start)
+                self.seconds[stage] += seconds
+                total += seconds
+        return len(launched), total
+
+    def _read_control(self) -> np.ndarray:
+        control = np.empty(_DONE + self.pool.ring_passes, np.uint32)
+        cl.enqueue_copy(self.device.queue, control, self.buffers["control"], is_blocking=True)
+        return control
+
+    def _accumulate(self, ring_pass: int, samples: int, first: int) -> None:
+        """Add one finished pass, from sample `first` on, to the film and free its place in the ring."""
+        local, film = 64, self.film.buffers
+        kernel = self.kernels["accumulate"]
+        set_arguments(
+            kernel,
+            self.buffers["results"],
+            *(film[name] for name in ("film", "film_peaks")),
+            *((self.buffers["result_counts"],) if "result_counts" in self.buffers else ()),
+            *((film["film_counts"],) if "film_counts" in film else ()),
+            *((self.buffers["result_firsts"], film["film_firsts"]) if "film_firsts" in film else ()),
+            *((self.buffers["pixel_list"],) if self.config.pixel_list else ()),
+            self.buffers["control"],
+            np.uint32(ring_pass),
+            np.uint32(self.pass_samples * self.sample_jobs),
+            np.uint32(samples),
+            np.uint32(first),
+            np.uint32(self.listed),
+        )
+        size = -(-self.listed // local) * local
+        event = cl.enqueue_nd_range_kernel(self.device.queue, kernel, (size,), (local,))
+        event.wait()
+        self.launches += 1
+        self.seconds["accumulate"] += 1e-9 * (event.profile.end - event.profile.start)
+        self._write("control", np.zeros(1, np.uint32), 4 * (_DONE + ring_pass))
+
+    def slot_statistics(self) -> dict[str, float]:
+        """Statistics that slots keep for themselves, combined over the slots."""
+        self._harvest()
+        return dict(self.film.slot_totals)
+
+    def _harvest(self) -> None:
+        """Collect what the slots have counted since the last time, and let them begin anew."""
+        rows = {f.name: n for n, f in enumerate(self.fields)}
+        zeros = np.zeros(self.stride, np.uint32)
+        totals = self.film.slot_totals
+        for name in totals:
+            field, row = self.fields[rows[name]], np.empty(self.stride, np.uint32)
+            at = 4 * self.stride * rows[name]
+            cl.enqueue_copy(self.device.queue, row, self.buffers["state"], src_offset=at, is_blocking=True)
+            self._write("state", zeros, at)
+            found = (row.view(np.float32) if field.kind == "f" else row)[: self.pool.slots].astype(np.float64)
+            combine = layout.SLOT_STATISTICS[name]
+            totals[name] = combine([totals[name], combine(found)]).item()
+        self._harvested = time.perf_counter()
+
+    def non_finite(self) -> int:
+        """Samples that were NaN or infinite."""
+        return int(self._read_control()[_NON_FINITE])

@@ -1,0 +1,3 @@
+"""From a scene's records to arrays as the device has them: volumes, majorants, surfaces, media, materials,
+lights, camera, filter.  Pure NumPy.
+"""

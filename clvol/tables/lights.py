@@ -1,0 +1,203 @@
+"""A scene's lights as the device has them: Emitter records, and the triangles of those that are meshes.
+
+Pure functions from records to arrays.  An environment is emitter 0; next-event estimation looks for it there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from clvol import layout
+from clvol.scene import records
+from clvol.tables.environment import envmap_distribution, luminance, mean_luminance
+
+QUADRICS = ("sphere", "disk", "cylinder")
+"""Kinds of shape that stay what they are on the device; all others are triangles there."""
+
+RANDOM_STEPS = 2.0**32
+"""Values that a random number of the device takes."""
+
+
+class Surfaces(Protocol):
+    """A scene's surfaces as the device numbers them."""
+
+    shapes: Sequence[records.Shape]  # in the order of the SHAPE records
+    vertices: np.ndarray  # float32 (n, 3), world space, relative to the scene's centre
+    faces: np.ndarray  # uint32 (m, 4): three vertices and the number of the shape
+
+
+class LightTable(NamedTuple):
+    """Lights on the device.
+
+    emitters : EMITTER records.  faces : uint32 (k,), numbers of triangles.  cdf : float32 (k,).
+    of_shape : int32, per shape the number of its emitter, or -1.
+
+    A mesh's emitter has `count` triangles.  Its `count + 1` entries of both arrays begin at its `first`:
+    those of `cdf` go from 0 to 1, and the last of `faces` is not used.
+    """
+
+    emitters: np.ndarray
+    faces: np.ndarray
+    cdf: np.ndarray
+    of_shape: np.ndarray
+
+
+def emitter_order(scene: records.Scene) -> list[records.Emitter]:
+    """Emitters that are no shapes, with the environment, if any, first."""
+    return sorted(scene.emitters, key=lambda e: not _is_environment(e))
+
+
+def light_table(
+    scene: records.Scene, centre: np.ndarray, radius: float, surfaces: Surfaces | None = None
+) -> LightTable:
+    """Every light of a scene, by the power it sends through the scene's sphere.
+
+    centre : float64 (3,), what device positions are relative to.
+    radius : of a sphere round it that holds the scene.
+    surfaces : None where a scene has none.
+
+    The environment comes first, or else the strongest light; the others follow, weakest first, in the order
+    of their intervals of the random number that chooses (`selection`).
+    """
+    emitters = emitter_order(scene)
+    shapes = () if surfaces is None else surfaces.shapes
+    shining = [number for number, shape in enumerate(shapes) if shape.emission is not None]
+    table = np.zeros(len(emitters) + len(shining), layout.EMITTER)
+    power = np.zeros(len(table))
+    for i, emitter in enumerate(emitters):
+        power[i] = _describe_emitter(table[i], emitter, centre, radius)
+    faces, cdf = [np.zeros(0, np.uint32)], [np.zeros(0, np.float32)]
+    for i, number in enumerate(shining, len(emitters)):
+        if shapes[number].kind in QUADRICS:
+            table[i]["primitive"], table[i]["count"] = quadric_primitive(surfaces, number), 1
+        else:
+            table[i]["first"] = sum(map(len, faces))
+            for arrays, run in zip((faces, cdf), mesh_run(surfaces, number, table[i]), strict=True):
+                arrays.append(run)
+        power[i] = _describe_area(table[i], shapes[number], number)
+    order = np.argsort(power, kind="stable")
+    if len(order):
+        first = 0 if emitters and _is_environment(emitters[0]) else order[-1]
+        order = np.concatenate([[first], order[order != first]])
+    table = table[order]
+    table["select_pdf"], table["cdf"] = selection(power[order])
+    of_shape = np.full(len(shapes), -1, np.int32)
+    lit = np.flatnonzero(table["kind"] == layout.enum("EMITTER", "area"))
+    of_shape[table["shape"][lit]] = lit
+    return LightTable(table, np.concatenate(faces), np.concatenate(cdf), of_shape)
+
+
+def selection(power: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Probability of each light and its cumulative table, float32 (n,) each.
+
+    Intervals begin with light 1 and end with light 0, and their borders are multiples of 2⁻³², so that the
+    device, which compares a random number of 32 bits, picks each with just the probability it says: in
+    proportion to `power` but for that rounding, never 0 for any light but an environment, and 0 for a power
+    of 0.  Where all have none, they are equally likely.
+    """
+    if not len(power):
+        return np.zeros(0, np.float32), np.zeros(0, np.float32)
+    share = power / power.sum() if power.sum() > 0 else np.full(len(power), 1 / len(power))
+    steps = np.ceil(np.roll(share, -1) * RANDOM_STEPS)
+    cdf = np.minimum(np.cumsum(steps) / RANDOM_STEPS, 1.0).astype(np.float32)
+    cdf[np.flatnonzero(steps)[-1] :] = 1.0
+    return np.roll(np.diff(cdf, prepend=np.float32(0)), 1), np.roll(cdf, 1)
+
+
+def mesh_run(surfaces: Surfaces, number: int, record: np.void) -> tuple[np.ndarray, np.ndarray]:
+    """A shape's entries of `LightTable.faces` and `.cdf`; writes its triangles and area into the record."""
+    members = np.flatnonzero(surfaces.faces[:, 3] == number)
+    a, b, c = (surfaces.vertices[surfaces.faces[members, k]].astype(np.float64) for k in range(3))
+    area = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)])
+    record["count"], record["area"] = len(members), area[-1]
+    record["primitive"] = members[0] if len(members) else 0
+    cdf = area / area[-1] if area[-1] > 0 else np.append(0.0, np.ones(len(members)))
+    return np.append(members, 0).astype(np.uint32), cdf.astype(np.float32)
+
+
+def quadric_primitive(surfaces: Surfaces, number: int) -> int:
+    """Number of a shape's primitive: quadrics follow all triangles, in the order of their shapes."""
+    return len(surfaces.faces) + sum(shape.kind in QUADRICS for shape in surfaces.shapes[:number])
+
+
+def quadric_area(shape: records.Shape) -> float:
+    """World area of a sphere, a disk (an ellipse where it is stretched), or a cylinder without its ends."""
+    x, y, z = shape.to_world[:3, :3].T
+    if shape.kind == "sphere":
+        return 4 * np.pi * float(x @ x)
+    if shape.kind == "disk":
+        return np.pi * float(np.linalg.norm(np.cross(x, y)))
+    return 2 * np.pi * float(np.linalg.norm(x) * np.linalg.norm(z))
+
+
+def spot_solid_angle(cutoff: float, beam: float) -> float:
+    """Integral over all directions of a spot's fall-off, steradians; both angles in radians.
+
+    It is 2π (1 − (sin c − sin b) / (c − b)), written without the difference of near sines.
+    """
+    beam = min(beam, cutoff)
+    return 2 * np.pi * (1 - np.cos((cutoff + beam) / 2) * np.sinc((cutoff - beam) / (2 * np.pi)))
+
+
+def envmap_arrays(emitter: records.EnvmapEmitter) -> dict[str, np.ndarray]:
+    """What the device knows of an environment map, by argument name: its record, texels and distribution."""
+    record = np.zeros(1, layout.ENVMAP)
+    rotation = emitter.to_world[:3, :3]
+    record["world_from_env"] = np.column_stack([rotation, np.zeros(3)]).reshape(12)
+    record["env_from_world"] = np.column_stack([np.linalg.inv(rotation), np.zeros(3)]).reshape(12)
+    height, width, _ = emitter.radiance.shape
+    record["size"] = width, height
+    marginal, conditional = envmap_distribution(emitter.radiance)
+    return {
+        "envmap": record,
+        "env_texels": emitter.radiance.astype(np.float32, copy=False),
+        "env_marginal": marginal,
+        "env_conditional": conditional,
+    }
+
+
+def _is_environment(emitter: records.Emitter) -> bool:
+    return isinstance(emitter, (records.ConstantEmitter, records.EnvmapEmitter))
+
+
+def _rgb(value: tuple[float, ...]) -> np.ndarray:
+    return np.broadcast_to(np.asarray(value, np.float64), 3)
+
+
+def _describe_area(record: np.void, shape: records.Shape, number: int) -> float:
+    """Fill in an area light and return its power; a mesh's area is there already."""
+    if shape.kind in QUADRICS:
+        record["area"] = quadric_area(shape)
+    record["kind"] = layout.enum("EMITTER", "area")
+    record["shape"] = number
+    record["value"] = _rgb(shape.emission)
+    return np.pi * float(record["area"]) * float(luminance(_rgb(shape.emission)))
+
+
+def _describe_emitter(record: np.void, emitter: records.Emitter, centre: np.ndarray, radius: float) -> float:
+    """Fill in a light that is no shape and return its power."""
+    disc = np.pi * radius**2
+    match emitter:
+        case records.ConstantEmitter():
+            value, extent = emitter.radiance, 4 * np.pi * disc
+        case records.EnvmapEmitter():
+            value, extent = (mean_luminance(emitter.radiance),), 4 * np.pi * disc
+        case records.DirectionalEmitter():
+            value, extent = emitter.irradiance, disc
+            record["vector"] = emitter.direction
+        case records.PointEmitter():
+            value, extent = emitter.intensity, 4 * np.pi
+            record["vector"] = np.asarray(emitter.position) - centre
+        case records.SpotEmitter():
+            cutoff, beam = np.radians(emitter.cutoff_angle), np.radians(emitter.beam_width)
+            value, extent = emitter.intensity, spot_solid_angle(cutoff, beam)
+            axis = emitter.to_world[:3, 2]
+            record["vector"] = axis / np.linalg.norm(axis)
+            record["position"] = emitter.to_world[:3, 3] - centre
+            record["cutoff_angle"], record["beam_width"] = cutoff, beam
+    record["kind"] = layout.enum("EMITTER", type(emitter).__name__.removesuffix("Emitter"))
+    record["value"] = _rgb(value)
+    return extent * float(luminance(_rgb(value)))

@@ -1,0 +1,139 @@
+"""BSDFs of a scene as what the device reads: one material per distinct side of a surface, and their textures.
+
+Wrappers end here: a `TwoSided` becomes the two materials of a shape, a `Mask` the opacity of a material.
+Nothing here needs a device.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from clvol import layout
+from clvol.scene import materials
+from clvol.scene.material_facts import Side, bsdf_sides, side_kind
+from clvol.scene.materials import Bitmap, Bsdf, Checkerboard, Spectrum, Texture
+from clvol.tables.coat import MIN_ALPHA, coat_table, diffuse_reflectance
+from clvol.tables.textures import TextureTable, mean_color
+
+BSDF_HEADERS = {
+    "DIFFUSE": "bsdf/diffuse.h",
+    "DIELECTRIC": "bsdf/dielectric.h",
+    "THIN_DIELECTRIC": "bsdf/dielectric.h",
+    "ROUGH_DIELECTRIC": "bsdf/rough_dielectric.h",
+    "CONDUCTOR": "bsdf/conductor.h",
+    "ROUGH_CONDUCTOR": "bsdf/rough_conductor.h",
+    "PLASTIC": "bsdf/plastic.h",
+    "ROUGH_PLASTIC": "bsdf/rough_plastic.h",
+}
+"""Kind of BSDF -> its header, included before bsdf/bsdf.h; NULL needs none."""
+
+BLACK = -1
+"""Number of the material that absorbs everything: the back of what has only a front."""
+
+
+@dataclass(frozen=True, eq=False)
+class MaterialTable:
+    """Device records of every material.
+
+    materials : MATERIAL records (n,).  textures : TEXTURE records (m,).  texels : float32 (t, 3), linear.
+    tables : float32 (k,).  sides : int32 (bsdfs, 2), the materials of each one's front and back, or `BLACK`.
+    """
+
+    materials: np.ndarray
+    textures: np.ndarray
+    texels: np.ndarray
+    tables: np.ndarray
+    sides: np.ndarray
+
+
+def material_table(bsdfs: Sequence[Bsdf]) -> MaterialTable:
+    """Materials of `bsdfs`, those of a scene's shapes in their order; each object gives its records once.
+
+    Raises
+    ------
+    ValueError
+        Records nested as the loader never nests them (see `bsdf_sides`).
+    """
+    textures = TextureTable()
+    tables: list[np.ndarray] = []
+    numbers: dict[Side, int] = {}
+    records: list[np.ndarray] = []
+    sides = np.full((len(bsdfs), 2), BLACK, np.int32)
+    for n, bsdf in enumerate(bsdfs):
+        for where, side in enumerate(bsdf_sides(bsdf)):
+            if side is None:
+                continue
+            if side not in numbers:
+                numbers[side] = len(records)
+                records.append(_record(side, textures, tables))
+            sides[n, where] = numbers[side]
+    return MaterialTable(
+        np.array(records, layout.MATERIAL),
+        np.array(textures.records, layout.TEXTURE),
+        np.concatenate([*textures.texels, np.empty((0, 3), np.float32)]),
+        np.concatenate([*tables, np.empty(0, np.float32)]),
+        sides,
+    )
+
+
+def _record(side: Side, textures: TextureTable, tables: list[np.ndarray]) -> np.ndarray:
+    """One MATERIAL record, scalar; may add to `textures` and `tables`."""
+    bsdf = side.bsdf
+    record = np.zeros((), layout.MATERIAL)
+    kind = side_kind(bsdf)
+    record["kind"] = layout.enum("MATERIAL", kind)
+    record["opacity"], record["opacity_texture"] = 1.0, -1
+    for opacity in side.opacities:
+        if isinstance(opacity, Bitmap | Checkerboard):
+            record["opacity_texture"] = textures.add(opacity, as_number=True)
+        else:
+            record["opacity"] *= np.mean(opacity)
+    black = (0.0,)
+    for field, name in (
+        ("reflectance", "diffuse_reflectance" if "PLASTIC" in kind else "reflectance"),
+        ("specular", "specular_reflectance"),
+        ("transmittance", "specular_transmittance"),
+    ):
+        color = black if side.black else getattr(bsdf, name, black)
+        _set_color(record, field, color, textures)
+    record["ior"] = getattr(bsdf, "int_ior", 1.0) / getattr(bsdf, "ext_ior", 1.0)
+    if isinstance(bsdf, materials.Conductor | materials.RoughConductor):
+        record["eta"], record["k"] = (_rgb(value) for value in (bsdf.eta, bsdf.k))
+    if kind.startswith("ROUGH"):
+        record["distribution"] = layout.enum("DISTRIBUTION", bsdf.distribution)
+        both = getattr(bsdf, "alpha", None)
+        record["alpha_u"] = max(getattr(bsdf, "alpha_u", both), MIN_ALPHA)
+        record["alpha_v"] = max(getattr(bsdf, "alpha_v", both), MIN_ALPHA)
+    if isinstance(bsdf, materials.Plastic | materials.RoughPlastic):
+        _set_coat(record, bsdf, tables)
+    return record
+
+
+def _set_coat(
+    record: np.ndarray, bsdf: materials.Plastic | materials.RoughPlastic, tables: list[np.ndarray]
+) -> None:
+    """What plastics alone have; the coat's share of samples goes by its mean colour and the base's."""
+    ior = bsdf.int_ior / bsdf.ext_ior
+    record["nonlinear"] = bsdf.nonlinear
+    base, coat = mean_color(bsdf.diffuse_reflectance), mean_color(bsdf.specular_reflectance)
+    record["specular_weight"] = coat / (base + coat) if base + coat > 0 else 0.5
+    if isinstance(bsdf, materials.Plastic):
+        record["inner_reflectance"] = diffuse_reflectance(1 / ior)
+        return
+    transmittance, record["inner_reflectance"] = coat_table(bsdf.distribution, bsdf.alpha, ior)
+    record["table"] = sum(len(table) for table in tables)
+    tables.append(transmittance)
+
+
+def _set_color(record: np.ndarray, field: str, color: Texture, textures: TextureTable) -> None:
+    if isinstance(color, Bitmap | Checkerboard):
+        record[f"{field}_texture"] = textures.add(color)
+    else:
+        record[field], record[f"{field}_texture"] = _rgb(color), -1
+
+
+def _rgb(color: Spectrum) -> np.ndarray:
+    return np.broadcast_to(np.asarray(color, np.float32), 3)

@@ -1,0 +1,170 @@
+"""Media as device records: where each is, what it is made of, and what bounds it.  Pure NumPy."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clvol import layout
+from clvol.planning.features import bounding_kind, is_homogeneous
+from clvol.scene import records
+from clvol.scene.boundaries import MediumEntry, entry_bounds, is_clipped
+from clvol.scene.phase import phase_lobes
+from clvol.scene.thinness import thin_media
+from clvol.tables.apart import peak_extinction
+from clvol.tables.blackbody import blackbody_rgb
+from clvol.tables.prepare import PreparedScene, PreparedVolume
+
+BOUND_SLACK = 1e-5
+"""Share of its size by which a medium's world box exceeds the boundaries that hold it."""
+
+
+def rows_3x4(matrix: np.ndarray) -> np.ndarray:
+    """The affine part of a 4x4 matrix as 12 floats."""
+    return matrix[:3].astype(np.float32).reshape(12)
+
+
+def _rgb(value: tuple[float, ...]) -> np.ndarray:
+    return np.broadcast_to(np.asarray(value, np.float64), 3)
+
+
+def medium_table(prepared: PreparedScene, volumes: dict[int, int], step: float | None) -> np.ndarray:
+    """MEDIUM records of a scene's media, in the order of its entries.
+
+    volumes : number of each volume, by id().  step : world length of a marching step; None: a voxel's edge.
+    """
+    entries = prepared.boundaries.entries
+    table = np.zeros(len(entries), layout.MEDIUM)
+    cell_offset = kd_root = links_first = phase_first = 0
+    sky, suns = mean_incident_radiance(prepared.scene)
+    alone = prepared.surfaces is None
+    boxes = entry_bounds(prepared.scene, prepared.boundaries)
+    thin = thin_media(prepared.scene, prepared.boundaries)
+    for record, entry, box, is_thin in zip(table, entries, boxes, thin, strict=True):
+        medium = entry.medium
+        record["thin"] = int(is_thin)
+        record["presence"] = int(entry.shape is not None or entry.everywhere)
+        if entry.shape is not None:
+            record["shape_from_world"] = rows_3x4(_from_centred(entry.shape.to_world, prepared.centre))
+            record["shape_kind"] = layout.enum("SHAPE", bounding_kind(entry.shape))
+        record["homogeneous"] = int(is_homogeneous(medium))
+        record["clipped"] = int(is_clipped(medium))
+        record["phase_first"], record["phase_count"] = phase_first, len(phase_lobes(medium.phase))
+        phase_first += record["phase_count"]
+        record["sample_emitters"] = int(medium.sample_emitters)
+        _emission(record, medium, volumes)
+        caught = -np.expm1(-most_depth(prepared, medium, box))  # a sun is seen in what scatters it alone
+        record["background"] = (sky + suns * caught) * expected_albedo(medium) * alone
+        record["sigma_t_volume"] = volumes.get(id(medium.sigma_t), -1)
+        record["albedo_volume"] = volumes.get(id(medium.albedo), -1)
+        if isinstance(medium.albedo, records.ConstVolume):
+            record["albedo"] = _rgb(medium.albedo.value)
+        if is_homogeneous(medium):
+            record["sigma_t"] = _rgb(medium.sigma_t.value) * _rgb(medium.scale)
+            record["box_from_world"] = rows_3x4(_from_centred(medium.sigma_t.to_world, prepared.centre))
+            record["box_upper"] = 1.0
+            if medium.homogeneous and entry.shape is None and not entry.everywhere:
+                _clip_to(record, box, prepared.centre)
+            continue
+        majorant, volume = prepared.majorants[id(medium)], prepared.volumes[id(medium.sigma_t)]
+        to_brick = volume.world_to_index @ _centred(medium.sigma_t.index_to_world, prepared.centre)
+        record["sigma_t"] = _rgb(medium.scale)
+        record["box_from_world"] = rows_3x4(volume.world_to_index)
+        record["box_lower"] = (to_brick @ [*medium.sigma_t.lower, 1.0])[:3]
+        record["box_upper"] = (to_brick @ [*medium.sigma_t.upper, 1.0])[:3]
+        record["march_step"] = step or voxel_edges(volume).min()
+        record["majorant"] = majorant.majorant.max()
+        record["bound"] = max(record["majorant"], volume.bricks.peak.max())
+        record["cells"], record["cell_size"] = majorant.cells, majorant.cell_size
+        record["cell_offset"], record["kd_root"] = cell_offset, kd_root
+        record["links_first"], record["links_levels"] = links_first, majorant.levels
+        cell_offset += len(majorant.majorant)
+        links_first += 0 if majorant.links is None else majorant.links.size
+        kd_root += 0 if majorant.nodes is None else len(majorant.nodes)
+    return table
+
+
+def _clip_to(record: np.void, box: tuple[np.ndarray, np.ndarray], centre: np.ndarray) -> None:
+    """Bounds a medium by a world box as well: a boundary that is open lets no path stray for ever."""
+    slack = BOUND_SLACK * (np.linalg.norm(box[1] - box[0]) + np.abs(box[0] - centre).max())
+    record["clipped"] = 1
+    record["box_from_world"] = np.eye(4)[:3].reshape(12)
+    record["box_lower"], record["box_upper"] = box[0] - centre - slack, box[1] - centre + slack
+
+
+def phase_table(entries: tuple[MediumEntry, ...]) -> np.ndarray:
+    """One PHASE record per lobe of each medium, in the order that `phase_first` counts in."""
+    lobes = [
+        (layout.enum("PHASE", p.kind), p.g, share)
+        for e in entries
+        for p, share in phase_lobes(e.medium.phase)
+    ]
+    return np.array(lobes, layout.PHASE)
+
+
+def voxel_edges(volume: PreparedVolume) -> np.ndarray:
+    """World lengths of a voxel's edges, float64 (3,)."""
+    return np.linalg.norm(np.linalg.inv(volume.world_to_index)[:3, :3], axis=0)
+
+
+def mean_incident_radiance(scene: records.Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Mean over all directions of the radiance that arrives from infinity, of the sky and of suns, which no
+    ray meets, float64 (3,); 0 where a limit of depth keeps most of it from the picture."""
+    sky, suns = np.zeros(3), np.zeros(3)
+    if 0 <= scene.integrator.max_depth < 3:
+        return sky, suns
+    for emitter in scene.emitters:
+        match emitter:
+            case records.ConstantEmitter():
+                sky += _rgb(emitter.radiance)
+            case records.DirectionalEmitter():
+                suns += _rgb(emitter.irradiance) / (4 * np.pi)
+            case records.EnvmapEmitter():
+                rows = emitter.radiance.mean(axis=1, dtype=np.float64)
+                weights = np.sin(np.pi * np.arange(len(rows)) / max(len(rows) - 1, 1)) + 1e-9
+                sky += np.average(rows, axis=0, weights=weights)
+    return sky, suns
+
+
+def most_depth(
+    prepared: PreparedScene, medium: records.Medium, box: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """Bound of the optical depth across the medium's world box, float64 (3,); inf where it has no end."""
+    extinction = peak_extinction(prepared, medium)
+    length = np.linalg.norm(box[1] - box[0])
+    return np.multiply(extinction, length, where=extinction > 0, out=np.zeros(3))
+
+
+def expected_albedo(medium: records.Medium) -> np.ndarray:
+    """Root of the share of diffuse light that a half-space of the medium returns (van de Hulst 1980), a guess
+    between that and the 1 of its rim, float64 (3,); 0 where the albedo varies."""
+    if not isinstance(medium.albedo, records.ConstVolume):
+        return np.zeros(3)
+    s = np.sqrt(1.0 - _rgb(medium.albedo.value))
+    return np.sqrt((1 - s) * (1 - 0.139 * s) / (1 + 1.17 * s))
+
+
+def _emission(record: np.void, medium: records.Medium, volumes: dict[int, int]) -> None:
+    """What a medium emits; constants are multiplied together here."""
+    record["emission_volume"] = volumes.get(id(medium.emission), -1)
+    record["temperature_volume"] = volumes.get(id(medium.temperature), -1)
+    if not medium.emits:
+        return
+    radiance = _rgb(medium.emission_scale)
+    if isinstance(medium.emission, records.ConstVolume):
+        radiance = radiance * _rgb(medium.emission.value)
+    if isinstance(medium.temperature, records.ConstVolume):
+        kelvin = (medium.temperature.value[0] - medium.temperature_offset) * medium.temperature_scale
+        radiance = radiance * blackbody_rgb(np.array([kelvin]))[0]
+    record["emits"], record["emission"] = 1, radiance
+    record["temperature_scale"] = medium.temperature_scale
+    record["temperature_offset"] = medium.temperature_offset
+
+
+def _centred(to_world: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    matrix = to_world.copy()
+    matrix[:3, 3] -= centre
+    return matrix
+
+
+def _from_centred(to_world: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    return np.linalg.inv(_centred(to_world, centre))

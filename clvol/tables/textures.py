@@ -1,0 +1,73 @@
+"""Textures as device records and texels, each once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clvol import layout
+from clvol.base.rows import bands
+from clvol.scene.materials import Bitmap, Checkerboard, Texture
+
+LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
+"""Of linear sRGB."""
+
+
+def mean_color(texture: Texture) -> float:
+    """Mean of a texture over its unit square and its channels; a bitmap's by luminance, as in Mitsuba."""
+    if isinstance(texture, Bitmap):
+        return float(texture.pixels.mean((0, 1), dtype=np.float64) @ LUMINANCE)
+    if isinstance(texture, Checkerboard):
+        return 0.5 * float(np.mean(texture.color0) + np.mean(texture.color1))
+    return float(np.mean(texture))
+
+
+class TextureTable:
+    """Collects TEXTURE `records` and their `texels`, float32 (count, 3) each."""
+
+    def __init__(self) -> None:
+        self.records: list[np.ndarray] = []
+        self.texels: list[np.ndarray] = []
+        self._numbers: dict[tuple[Bitmap | Checkerboard, bool], int] = {}
+        self._first: dict[tuple[int, bool], int] = {}
+        self._used = 0
+
+    def add(self, texture: Bitmap | Checkerboard, as_number: bool = False) -> int:
+        """Number of `texture`; `as_number`: of the one number that Mitsuba makes of each colour, which is the
+        luminance in a bitmap and the mean elsewhere."""
+        key = (texture, as_number)
+        if key not in self._numbers:
+            self._numbers[key] = len(self.records)
+            self.records.append(self._record(texture, as_number))
+        return self._numbers[key]
+
+    def _record(self, texture: Bitmap | Checkerboard, as_number: bool) -> np.ndarray:
+        record = np.zeros((), layout.TEXTURE)
+        record["to_uv"] = texture.to_uv[:2].reshape(-1)
+        if isinstance(texture, Checkerboard):
+            record["kind"] = layout.enum("TEXTURE", "CHECKERBOARD")
+            for name in ("color0", "color1"):
+                color = np.asarray(getattr(texture, name))
+                record[name] = np.mean(color) if as_number else np.broadcast_to(color, 3)
+            return record
+        height, width = texture.pixels.shape[:2]
+        record["kind"] = layout.enum("TEXTURE", "BITMAP")
+        record["nearest"] = texture.filter_type == "nearest"
+        record["wrap"] = layout.enum("WRAP", texture.wrap_mode)
+        record["size"] = width, height
+        record["first"] = self._add_texels(texture.pixels, as_number)
+        return record
+
+    def _add_texels(self, pixels: np.ndarray, as_number: bool) -> int:
+        """First texel of a picture; the same array under several textures is stored once."""
+        key = (id(pixels), as_number)
+        if key not in self._first:
+            self._first[key] = self._used
+            texels = np.ascontiguousarray(pixels, np.float32).reshape(-1, 3)
+            if as_number:
+                grey = np.empty_like(texels)
+                for rows in bands(len(texels), 1):
+                    grey[rows] = (texels[rows] @ LUMINANCE)[:, None]
+                texels = grey
+            self.texels.append(texels)
+            self._used += len(texels)
+        return self._first[key]

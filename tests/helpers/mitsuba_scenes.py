@@ -1,0 +1,73 @@
+"""The scenes of tests/mitsuba, and the pictures, meshes and volumes they read.
+
+Together they have every plugin that clvol and Mitsuba share.  Their defaults `depth`, `hide`
+and `integrator` may be set.
+"""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio  # noqa: N813
+from mesh_files import ascii_ply
+
+from clvol.volumes import write_vol
+
+SCENES = sorted((Path(__file__).parents[1] / "mitsuba").glob("*.xml"))
+
+
+def write_files(folder):
+    """Writes everything that the scenes read, and the scenes."""
+    rng = np.random.default_rng(1)
+    _write_image(folder / "picture.png", rng.integers(30, 255, (6, 8, 3)).astype(np.uint8))
+    _write_image(folder / "leaf.png", rng.integers(0, 255, (5, 7, 3)).astype(np.uint8))
+    sky = rng.uniform(0.1, 0.6, (16, 32, 3)).astype(np.float32)
+    sky[2:4, 5:8] = (12, 10, 7)
+    _write_image(folder / "sky.exr", sky)
+    unit = np.array([[0, 0, 0], [1, 1, 1]])
+    write_vol(folder / "smoke.vol", rng.uniform(0, 1, (6, 5, 7)).astype(np.float32) ** 2, unit)
+    write_vol(folder / "albedo.vol", rng.uniform(0.4, 1, (4, 4, 4, 3)).astype(np.float32), unit)
+    write_vol(folder / "colours.vol", rng.uniform(0, 1, (3, 4, 5, 3)).astype(np.float32), unit)
+    (folder / "smooth.ply").write_bytes(_smooth_ply())
+    (folder / "cup.obj").write_text(_cup_obj())
+    for scene in SCENES:
+        shutil.copy(scene, folder)
+
+
+def _write_image(path, pixels):
+    out = oiio.ImageOutput.create(str(path))
+    height, width, channels = pixels.shape
+    out.open(str(path), oiio.ImageSpec(width, height, channels, str(pixels.dtype)))
+    out.write_image(pixels)
+    out.close()
+
+
+def _smooth_ply(rings=6, sectors=9):
+    """A coarse ball with the normals of a fine one."""
+    theta, phi = np.meshgrid(
+        np.pi * np.arange(rings + 1) / rings, 2 * np.pi * np.arange(sectors + 1) / sectors, indexing="ij"
+    )
+    normals = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], axis=-1)
+    normals = np.round(normals, 6) + 0.0  # so that the seam and the poles meet, and no zero is negative
+    uvs = np.stack([phi / (2 * np.pi), theta / np.pi], axis=-1)
+    first = np.arange(rings * (sectors + 1)).reshape(rings, -1)[:, :-1]
+    below = first + sectors + 1
+    upper = np.stack([first, first + 1, below], axis=-1)[1:]  # the others have no area
+    lower = np.stack([first + 1, below + 1, below], axis=-1)[:-1]
+    faces = np.concatenate([upper.reshape(-1, 3), lower.reshape(-1, 3)])
+    rows = np.concatenate([normals, normals, uvs], axis=-1).reshape(-1, 8)
+    return ascii_ply(rows, faces, ("x", "y", "z", "nx", "ny", "nz", "u", "v"))
+
+
+def _cup_obj(sectors=7):
+    """An open cone of quadrilaterals with texture coordinates and no normals."""
+    lines = []
+    for i in range(sectors + 1):
+        turn = 2 * np.pi * i / sectors
+        for radius, height, v in ((0.4, -0.8, 0.0), (0.8, 0.7, 1.0)):
+            lines.append(f"v {radius * np.cos(turn):.6f} {height} {radius * np.sin(turn):.6f}")
+            lines.append(f"vt {1.5 * i / sectors:.6f} {v}")
+    for i in range(sectors):
+        a = 2 * i + 1
+        lines.append("f " + " ".join(f"{n}/{n}" for n in (a, a + 1, a + 3, a + 2)))
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,116 @@
+"""Runs single device functions: a tiny kernel round them, one work-item per number, on a real scene."""
+
+import numpy as np
+import pyopencl as cl
+
+from clvol import layout
+from clvol.device import programs
+from clvol.planning.choices import Choices, prepare_for
+from clvol.planning.config import KernelConfig
+from clvol.rendering.session import kernel_config, render_record
+from clvol.rendering.upload import upload_scene
+from clvol.scene.records import (
+    ConstantEmitter,
+    ConstVolume,
+    Film,
+    GridVolume,
+    Integrator,
+    Medium,
+    Perspective,
+    ReconstructionFilter,
+    Scene,
+    Shape,
+)
+from clvol.volumes.grid import DenseGrid
+
+UNIT_BOX = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
+
+
+def grid_volume(values, filter_type="trilinear"):
+    """A gridvolume in the unit cube from an array [z, y, x] or [z, y, x, channel]."""
+    values = np.ascontiguousarray(values, np.float32)
+    values = values[..., None] if values.ndim == 3 else values
+    nz, ny, nx, _ = values.shape
+    size = np.array([nx, ny, nz], float)
+    to_world = np.eye(4)
+    to_world[[0, 1, 2], [0, 1, 2]] = 1 / size
+    to_world[:3, 3] = 0.5 / size
+    lower = np.full(3, -0.5)
+    return GridVolume(DenseGrid(values, UNIT_BOX), to_world, lower, size - 0.5, filter_type)
+
+
+def unit_cube():
+    """Shape transform of the cube (0, 1)³."""
+    to_world = np.eye(4) * 0.5
+    to_world[:3, 3], to_world[3, 3] = 0.5, 1.0
+    return to_world
+
+
+WHITE = (ConstantEmitter(),)
+
+
+def scene_of(medium, emitters=WHITE, integrator=None, size=(8, 8), sensor=None, to_world=None):
+    """One medium in the unit cube before a camera that looks along +z."""
+    if sensor is None:
+        eye = np.eye(4)
+        eye[:3, 3] = 0.5, 0.5, -1.2
+        sensor = Perspective(eye, 40.0)
+    film = Film(*size, ReconstructionFilter("box", 0.5))
+    shape = Shape("cube", unit_cube() if to_world is None else to_world, medium)
+    return Scene(sensor, film, integrator or Integrator(), (shape,), tuple(emitters), spp=16)
+
+
+def medium_of(values, scale=1.0, albedo=0.0, **keywords):
+    """Heterogeneous medium from an array, or a homogeneous one from a number."""
+    if np.ndim(values) == 0:
+        return Medium(ConstVolume((float(values),)), ConstVolume((albedo,)), scale, **keywords)
+    return Medium(grid_volume(values), ConstVolume((albedo,)), scale, homogeneous=False, **keywords)
+
+
+class Probe:
+    """A scene on the device, and kernels of one line over it."""
+
+    def __init__(self, device, scene, **choices):
+        self.device = device
+        self.choices = Choices(**({"majorant": "grid"} | choices))
+        self.prepared = prepare_for(scene, self.choices)
+        self.config: KernelConfig = kernel_config(self.prepared, self.choices, device)
+        self.upload()
+
+    def upload(self, seed=1):
+        """Write the prepared scene to the device (again)."""
+        device = self.device
+        self.buffers = upload_scene(device, self.prepared, self.config, self.choices.step)
+        self.buffers["render"] = cl.Buffer(
+            device.context,
+            cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR,
+            hostbuf=render_record(self.prepared, seed),
+        )
+
+    def run(self, headers, body, outputs, inputs=()):
+        """Run `body` for `outputs[0].size` work-items with index `i`; arrays are out0, …, in0, …"""
+        names = [(f"out{n}", a) for n, a in enumerate(outputs)] + [
+            (f"in{n}", a) for n, a in enumerate(inputs)
+        ]
+        c_types = {"f": "float", "u": "uint", "i": "int"}
+        extra = "".join(f", __global {c_types[a.dtype.kind]} *{name}" for name, a in names)
+        source = programs.compose(
+            self.config,
+            [*headers],
+            f"__kernel void probe(CLVOL_ARGUMENTS{extra}, uint count)\n{{\n"
+            "    const Scene scene_ = CLVOL_SCENE;\n    const Scene *scene = &scene_;\n"
+            f"    const uint i = get_global_id(0);\n    if (i >= count)\n        return;\n{body}\n}}\n",
+        )
+        kernel = cl.Kernel(programs.build(self.device, source, "probe"), "probe")
+        flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
+        arrays = [cl.Buffer(self.device.context, flags, hostbuf=np.ascontiguousarray(a)) for _, a in names]
+        dummy = cl.Buffer(self.device.context, cl.mem_flags.READ_WRITE, 4)
+        scene = [
+            np.uint32(1) if a.name == "slot_stride" else self.buffers.get(a.name, dummy)
+            for a in layout.arguments(self.config)
+        ]
+        count = outputs[0].shape[0]
+        kernel(self.device.queue, (-(-count // 64) * 64,), (64,), *scene, *arrays, np.uint32(count))
+        for (_, host), buffer in zip(names[: len(outputs)], arrays, strict=False):
+            cl.enqueue_copy(self.device.queue, host, buffer, is_blocking=True)
+        return outputs

@@ -1,0 +1,233 @@
+"""Renders that nothing would end: walks go in legs from wave to wave, and an early end drops what has no end.
+
+Statistical tests compare two renders of independent samples at fixed seeds, false-alarm rate 1e-4 each.
+"""
+
+import contextlib
+import hashlib
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from stat_tests import assert_same_picture
+
+import clvol
+from clvol.planning.choices import Choices
+from clvol.rendering import wavefront
+from clvol.rendering.session import Session
+
+WALK_STEPS, STAGE_STEPS = 1 << 12, 1 << 13
+CASES = (
+    ("lumps", "delta", "ratio"),
+    ("lumps", "weighted-decomposition", "residual-ratio"),
+    ("lumps", "regular", "regular"),
+    ("overlap", "delta", "delta"),
+    ("overlap", "spectral-decomposition", "ratio"),
+    ("sheets", "spectral", "residual-ratio"),
+)
+
+
+def cube(lower, upper, values, scale, albedo):
+    """A grid between two corners."""
+    middle, half = np.add(upper, lower) / 2, np.subtract(upper, lower) / 2
+    place = clvol.translate(middle) @ clvol.scale(half)
+    corner = clvol.translate(lower) @ clvol.scale(2 * half)
+    return {
+        "type": "cube",
+        "to_world": place,
+        "bsdf": {"type": "null"},
+        "interior": {
+            "type": "heterogeneous",
+            "scale": scale,
+            "albedo": albedo,
+            "sigma_t": {"type": "gridvolume", "grid": values, "to_world": corner},
+        },
+    }
+
+
+def seen(width=8, **what):
+    """A scene before a camera that looks along +z at the unit cube."""
+    return clvol.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "volpath", "max_depth": -1, "rr_depth": 5},
+            "sensor": {
+                "type": "perspective",
+                "fov": 35.0,
+                "to_world": clvol.look_at(origin=(0.4, 0.6, -1.5), target=(0.5, 0.5, 0.5), up=(0, 1, 0)),
+                "film": {"type": "hdrfilm", "width": width, "height": width, "rfilter": {"type": "box"}},
+            },
+            "sky": {"type": "constant", "radiance": 0.5},
+            "sun": {"type": "directional", "direction": (0.3, -1.0, 0.4), "irradiance": 2.0},
+            **what,
+        }
+    )
+
+
+def scene_of(kind):
+    """Media of many tentative collisions: one alone; two that overlap, in colour; these between sheets."""
+    values = np.random.default_rng(5).uniform(0, 1, (6, 7, 5)).astype(np.float32) ** 3
+    if kind == "lumps":
+        return seen(cloud=cube((0, 0, 0), (1, 1, 1), values, 12.0, 0.7))
+    tint = np.stack([values, 0.5 * values, 0.8 * values], axis=-1)
+    media = {
+        "a": cube((0, 0, 0), (1, 1, 1), tint, 8.0, 0.7),
+        "b": cube((0.3, 0.2, 0.4), (1.2, 0.9, 1.1), values[::-1].copy(), 6.0, 0.4),
+    }
+    if kind == "sheets":
+        for n, z in enumerate((0.2, 0.6)):
+            media[f"sheet{n}"] = {
+                "type": "rectangle",
+                "to_world": clvol.translate((0.5, 0.5, z)) @ clvol.rotate((1, 0, 0), 40.0),
+                "bsdf": {"type": "mask", "opacity": 0.4, "nested": {"type": "diffuse"}},
+            }
+    return seen(**media)
+
+
+def digest(result):
+    return hashlib.sha256(result.image.tobytes() + result.variance.tobytes()).hexdigest()
+
+
+@pytest.mark.parametrize(("kind", "technique", "transmittance"), CASES)
+def test_walks_in_short_legs_give_the_same_picture(bounds, kind, technique, transmittance):
+    """One step a leg, or four pieces between planes: nearly every walk goes on in later waves."""
+    options = {"technique": technique, "transmittance": transmittance, "majorant": "grid"}
+    scene = scene_of(kind)
+    whole = clvol.render(scene, spp=1024, seed=1, **options)
+    bounds(WALK_STEPS=4 if technique == "regular" else 1, STAGE_STEPS=20)
+    cut = clvol.render(scene, spp=1024, seed=2, **options)
+    assert cut.stats["walks_exhausted"] == 0
+    assert_same_picture(whole, cut)
+
+
+def test_legs_do_not_depend_on_how_waves_are_cut(bounds):
+    """Slots that a stage leaves to the next wave keep their bits."""
+    scene = scene_of("sheets")
+    whole = clvol.render(scene, spp=64, seed=1)
+    bounds(STAGE_STEPS=1)
+    assert digest(clvol.render(scene, spp=64, seed=1)) == digest(whole)
+
+
+def test_a_walk_is_given_up_after_its_last_leg(bounds):
+    bounds(WALK_STEPS=2, WALK_LEGS=4)
+    result = clvol.render(scene_of("lumps"), spp=8, majorant_scale=20.0)
+    assert result.stats["walks_exhausted"] > 0
+
+
+def endless(kind):
+    """One voxel of 1e9; a majorant of 1e30; a medium that scatters 20,000 times across and never absorbs."""
+    values = np.ones((4, 4, 4), np.float32)
+    scale, albedo = 1.0, 0.5
+    if kind == "voxel":
+        values[:] = 0.0
+        values[1, 1, 1] = 1e9
+    if kind == "albedo":
+        scale, albedo = 20000.0, 1.0
+    return seen(4, cloud=cube((0, 0, 0), (1, 1, 1), values, scale, albedo))
+
+
+def session_of(device, kind, pool=256):
+    choices = Choices(majorant_scale=1e30 if kind == "majorant" else 1.0)
+    scene = scene_of(kind) if kind in ("lumps", "sheets") else endless(kind)
+    return Session.for_scene(device, scene, choices, 1, pool)
+
+
+def levels(*changes):
+    """Says how urgently the end is asked for: level n from call changes[n - 1] on."""
+    calls = [0]
+
+    def level():
+        calls[0] += 1
+        return sum(calls[0] > change for change in changes)
+
+    level.calls = calls
+    return level
+
+
+@pytest.mark.parametrize("kind", ["voxel", "majorant", "albedo"])
+def test_the_host_is_asked_after_a_bounded_number_of_steps(device, kind):
+    """No launch is longer than a stage's bound and a leg for each work-item, in both tracking stages."""
+    session = session_of(device, kind)
+    runs, config = session.wavefront, session.config
+    least = levels(8, 12)
+    before, most = [0, 0], [0.0]
+
+    def ask():
+        after = [runs.slot_statistics()["tentative"], runs.waves]
+        waves = after[1] - before[1]
+        if waves:
+            most[0] = max(most[0], (after[0] - before[0]) / waves)
+        before[:] = after
+        return least()
+
+    with contextlib.suppress(KeyboardInterrupt):  # raised where no pass was finished
+        session.run(0, 1 << 20, None, None, ask)
+    items = runs.groups * config.local_size
+    assert 0 < most[0] <= 2 * items * (STAGE_STEPS + WALK_STEPS)
+    assert least.calls[0] < 30
+
+
+def test_a_second_interrupt_keeps_finished_passes_and_leaves_nothing_behind(device):
+    session = session_of(device, "sheets", pool=None)
+    finished = []
+
+    def ask():
+        return 2 if finished else 0
+
+    done = session.run(0, 1 << 20, None, finished.append, ask)
+    assert done == finished[-1].samples_done > 0
+    cut = session.result(0, done)
+    session.restart(1)
+    assert session.run(0, done, None, None, lambda: 0) == done
+    assert digest(session.result(0, done)) == digest(cut)
+
+
+def test_a_time_limit_ends_paths_without_end(monkeypatch):
+    for name in ("_PATIENCE_SECONDS", "_FIRST_PATIENCE_SECONDS"):
+        monkeypatch.setattr(wavefront, name, 0.01)
+    with pytest.raises(clvol.RenderError, match="go on for very long"):
+        clvol.render(endless("majorant"), time_limit=0.01, majorant_scale=1e30)
+
+
+def test_ctrl_c_ends_walks_without_end():
+    """In a process of its own, which the limit kills if nothing else ends it."""
+    code = """
+import os, signal, sys
+sys.path[:0] = {path!r}
+signal.signal(signal.SIGINT, signal.default_int_handler)
+import clvol
+from test_endless import endless
+from clvol.rendering.wavefront import Wavefront
+launch, calls = Wavefront._launch, []
+def counted(self, waves):
+    calls.append(waves)
+    if len(calls) in (4, 6):
+        os.kill(os.getpid(), signal.SIGINT)
+    return launch(self, waves)
+Wavefront._launch = counted
+try:
+    clvol.render(endless("majorant"), majorant_scale=1e30)
+except KeyboardInterrupt:
+    print("ended after", len(calls))
+"""
+    here = [p for p in sys.path if p]
+    run = subprocess.run(
+        [sys.executable, "-c", code.replace("{path!r}", repr(here))],
+        capture_output=True,
+        text=True,
+        timeout=200,
+    )
+    assert run.stdout.startswith("ended after"), run.stderr
+
+
+def test_noise_shown_is_that_of_the_picture_so_far():
+    shown = []
+    result = clvol.render(scene_of("lumps"), spp=256, seed=1, pool=256, progress=shown.append)
+    noises = [record.noise for record in shown]
+    assert len(noises) > 10
+    assert noises[-1] == pytest.approx(result.noise, rel=1e-6)
+    for record in shown[4:]:  # by the law of the noise, which the first passes know to some percent
+        law = result.noise * math.sqrt(256 / record.samples_done)
+        assert record.noise == pytest.approx(law, rel=0.35)

@@ -1,0 +1,154 @@
+"""Side by side with Mitsuba 3.9: both load the same files, and their pictures agree in every tile and on the
+mean.
+
+Runs when asked for: ``pytest --mitsuba tests/transport/test_mitsuba.py``, which installs Mitsuba in
+an environment of its own, unless CLVOL_MITSUBA names a Python that has it.
+"""
+
+import importlib
+import os
+import re
+from pathlib import Path
+
+import mitsuba_scenes
+import numpy as np
+import pytest
+from scipy import stats
+from stat_tests import FALSE_ALARM, image_mean, sidak, tile_means
+
+import clvol
+from clvol.scene.loader import PLUGINS
+
+ROOT = Path(__file__).resolve().parents[2]
+TOOLS = ROOT / "tools"
+RUNS = 32
+"""Independent renders of Mitsuba, whose scatter is the variance of their mean; few would cost power, as
+Student's t has long tails where degrees of freedom are few."""
+TILE = 8
+BIAS = 0.01
+"""Of the image mean: what every comparison must see at least."""
+GALLERY = dict.fromkeys(("smoke in a room", "shafts of light", "jade"), 0.02)
+"""The same for the scenes of `scenes/`, where Mitsuba's noise would take a quarter of an hour each."""
+ROUNDING = 2e-6
+"""Of the picture's mean: what is equal but for rounding of floats has no variance to excuse it."""
+
+# Scene (of tests/mitsuba/, if no path), its defaults, samples per pixel of a render of Mitsuba's and of ours.
+PICTURES = {
+    "room": ("room", {}, 96, 2048),
+    "glass": ("glass", {}, 32, 1024),
+    "meshes": ("meshes", {}, 32, 4096),
+    "lamps": ("lamps", {}, 64, 2048),
+    "fog": ("fog", {}, 96, 4096),
+    "cloud": ("cloud", {}, 24, 1024),
+    "bodies": ("bodies", {}, 48, 768),
+    "passages": ("passages", {}, 16, 512),
+    "passages, depth 1": ("passages", {"depth": 1, "rfilter": "lanczos"}, 32, 4096),
+    "passages, depth 2": ("passages", {"depth": 2, "rfilter": "catmullrom"}, 32, 2048),
+    "passages, depth 3": ("passages", {"depth": 3}, 16, 512),
+    "fog, depth 3": ("fog", {"depth": 3}, 96, 4096),
+    "passages, hidden": ("passages", {"hide": "true", "depth": 5}, 32, 1024),
+    "smoke in a room": (ROOT / "scenes/room", {"res": 24}, 192, 4096),
+    "shafts of light": (ROOT / "scenes/shaft", {"width": 32, "height": 24}, 192, 4096),
+    "jade": (ROOT / "scenes/jade", {"width": 32, "height": 24}, 64, 2048),
+    "lamps, hidden": ("lamps", {"hide": "true", "integrator": "volpath"}, 160, 8192),
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Where the scenes and what they read lie."""
+    folder = tmp_path_factory.mktemp("mitsuba")
+    mitsuba_scenes.write_files(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def mitsuba(folder):
+    """Images (RUNS, height, width, 3) of independent renders of a scene by Mitsuba."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(TOOLS)
+        side = importlib.import_module("mitsuba_side")
+    python = side.mitsuba_python(os.environ.get("CLVOL_MITSUBA"))
+
+    def render(scene, defaults, spp):
+        with side.MitsubaSide(python, str(folder / f"{scene}.xml"), defaults, os.cpu_count()) as worker:
+            assert worker.version.startswith("3.9.")
+            # a moment integrator adds channels after the picture's
+            return np.array([worker.render(spp, seed)[0][..., :3] for seed in range(RUNS)], float)
+
+    return render
+
+
+def both(folder, mitsuba, scene, defaults, spp, our_spp, our_defaults=None):
+    """Mitsuba's images of a scene, and our result."""
+    theirs = mitsuba(scene, {name: str(value) for name, value in defaults.items()}, spp)
+    ours = {name: str(value) for name, value in (our_defaults or defaults).items()}
+    result = clvol.render(clvol.load_file(str(folder / f"{scene}.xml"), **ours), spp=our_spp, seed=1)
+    assert result.image.shape == theirs.shape[1:]
+    return theirs, result
+
+
+def welch(theirs, mean, variance, rounding):
+    """Student's t and degrees of freedom of RUNS values against a mean of known variance (Welch 1947)."""
+    scatter = theirs.var(axis=0, ddof=1) / RUNS
+    total = scatter + variance + rounding**2
+    freedom = (RUNS - 1) * (total / np.maximum(scatter, 1e-6 * total)) ** 2
+    return (mean - theirs.mean(axis=0)) / np.sqrt(total), freedom, np.sqrt(total)
+
+
+def deviating(t, freedom, alpha):
+    """How many of several comparisons deviate, with a joint false-alarm rate alpha (Šidák)."""
+    p = 2 * stats.t.sf(np.abs(t), freedom)
+    return int((p < sidak(alpha, t.size)).sum())
+
+
+def compare(theirs, result, alpha):
+    """Messages on what deviates, and the smallest relative bias of the image mean that would be seen."""
+    rounding = ROUNDING * theirs.mean()
+    nothing = np.zeros_like(theirs)
+    tiles = np.array([tile_means(image, none, TILE)[0] for image, none in zip(theirs, nothing, strict=True)])
+    found = []
+    for what, runs, (mean, variance) in (
+        ("tiles", tiles, tile_means(result.image, result.variance, TILE)),
+        ("channels of the mean", theirs.mean(axis=(1, 2)), image_mean(result)),
+    ):
+        t, freedom, error = welch(runs, mean, variance, rounding)
+        count = deviating(t, freedom, alpha / 2)
+        if count:
+            found.append(f"{count} of {t.size} {what} deviate, by {np.abs(t).max():.1f} sigma at most")
+    bound = stats.t.isf(sidak(alpha / 2, t.size) / 2, freedom)
+    return found, float((bound * error / mean).max())
+
+
+@pytest.mark.mitsuba
+@pytest.mark.parametrize("name", PICTURES)
+def test_both_render_the_same_picture(folder, mitsuba, record_property, name):
+    """A false alarm in any of the pictures: FALSE_ALARM."""
+    scene, defaults, spp, our_spp = PICTURES[name]
+    theirs, result = both(folder, mitsuba, scene, defaults, spp, our_spp)
+    for count in ("non_finite", "majorant_violations", "walks_exhausted"):
+        assert result.stats[count] == 0
+    found, seen = compare(theirs, result, sidak(FALSE_ALARM, len(PICTURES)))
+    record_property("smallest bias seen", seen)
+    assert not found, "; ".join(found)
+    least = GALLERY.get(name, BIAS)
+    assert seen < least, f"too noisy to see a bias of {least}: {seen}"
+
+
+@pytest.mark.mitsuba
+def test_a_picture_that_lacks_its_last_two_bounces_is_noticed(folder, mitsuba):
+    theirs, result = both(folder, mitsuba, "passages", {"depth": 5}, 16, 512, {"depth": 3})
+    found, _ = compare(theirs, result, sidak(FALSE_ALARM, len(PICTURES)))
+    assert found
+
+
+def test_the_scenes_have_every_plugin_that_both_programs_know():
+    text = "".join(scene.read_text() for scene in mitsuba_scenes.SCENES)
+    used = set(re.findall(r'(?:type|name="integrator" value)="(\w+)"', text))
+    used |= {value for _, defaults, *_ in PICTURES.values() for value in defaults.values()}
+    assert {name for plugins in PLUGINS.values() for name in plugins} - used == {
+        "vdbvolume",
+        "stl",
+        "glb",
+        "gltf",
+    }
