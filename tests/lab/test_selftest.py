@@ -16,7 +16,8 @@ from clvol.cli.main import main
 from clvol.cli.selftest import notes, table_of
 from clvol.device import programs
 from clvol.errors import OptionError
-from clvol.lab import judgement, selftests
+from clvol.lab import judgement
+from clvol.lab import selftest as selftests
 from clvol.lab.combinations import KEYS, covering, in_force, independent_seeds, unbiased, usable
 from clvol.lab.judgement import judge
 from clvol.lab.reduced import reduced
