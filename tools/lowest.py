@@ -15,9 +15,18 @@ from packaging.requirements import Requirement
 PROJECT = Path(__file__).resolve().parent.parent / "pyproject.toml"
 
 
-def lowest(requirements: Iterable[str]) -> Iterator[str]:
-    """`name==version` of each requirement's lower bound, which each must have."""
+def expanded(name: str, extras: dict[str, list[str]], requirements: Iterable[str]) -> Iterator[Requirement]:
+    """The requirements, with the project's own extras (`name[extra]`) as what these consist of."""
     for requirement in map(Requirement, requirements):
+        if requirement.name != name:
+            yield requirement
+        for extra in requirement.extras if requirement.name == name else ():
+            yield from expanded(name, extras, extras[extra])
+
+
+def lowest(requirements: Iterable[Requirement]) -> Iterator[str]:
+    """`name==version` of each requirement's lower bound, which each must have."""
+    for requirement in requirements:
         bounds = [spec.version for spec in requirement.specifier if spec.operator == ">="]
         if len(bounds) != 1:
             raise SystemExit(f"{PROJECT.name}: {requirement} has no lower bound")
@@ -27,7 +36,8 @@ def lowest(requirements: Iterable[str]) -> Iterator[str]:
 
 def main() -> None:
     project = tomllib.loads(PROJECT.read_text(encoding="utf-8"))["project"]
-    print("\n".join(lowest([*project["dependencies"], *project["optional-dependencies"]["test"]])))
+    wanted = [*project["dependencies"], f"{project['name']}[test]"]
+    print("\n".join(lowest(expanded(project["name"], project["optional-dependencies"], wanted))))
 
 
 if __name__ == "__main__":

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from clvol.version import __version__
+
 ROOT = Path(__file__).resolve().parents[2]
 COMPOSE = """
 import site, sys
@@ -39,7 +41,7 @@ def pip(*arguments: str | Path) -> None:
 def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the checkout: a build leaves folders behind, and takes up what earlier ones left."""
     folder = tmp_path_factory.mktemp("source")
-    for name in ("pyproject.toml", "README.md"):
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, folder)
     for name in ("clvol", "cl"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
@@ -74,10 +76,25 @@ def compose(folder: Path, site: Path) -> Path:
 
 def test_wheel_holds_every_kernel_file_and_every_module(wheel: Path) -> None:
     expected = {f"clvol/_cl/{p.relative_to(ROOT / 'cl').as_posix()}" for p in (ROOT / "cl").rglob("*.*")}
-    expected |= {p.relative_to(ROOT).as_posix() for p in (ROOT / "clvol").rglob("*.py")}
+    files = (p for p in (ROOT / "clvol").rglob("*.*") if "__pycache__" not in p.parts)
+    expected |= {p.relative_to(ROOT).as_posix() for p in files}
     assert len(expected) > 50
     found = {name for name in zipfile.ZipFile(wheel).namelist() if name.startswith("clvol/")}
     assert found == expected
+
+
+def test_wheel_says_its_licence_and_holds_its_text(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        [text] = [name for name in archive.namelist() if name.endswith("dist-info/licenses/LICENSE")]
+        assert archive.read(text) == (ROOT / "LICENSE").read_bytes()
+        [metadata] = [name for name in archive.namelist() if name.endswith("dist-info/METADATA")]
+        assert b"\nLicense-Expression: Apache-2.0\n" in archive.read(metadata)
+
+
+def test_the_citation_names_this_version_and_this_licence() -> None:
+    lines = (ROOT / "CITATION.cff").read_text(encoding="utf-8").splitlines()
+    assert f"version: {__version__}" in lines
+    assert "license: Apache-2.0" in lines
 
 
 def test_nothing_but_clvol_lands_in_site_packages(wheel: Path) -> None:
@@ -119,6 +136,7 @@ def test_source_distribution_holds_what_its_tests_need(tmp_path: Path) -> None:
     [path] = tmp_path.glob("*.tar.gz")
     with tarfile.open(path) as archive:
         found = {name.partition("/")[2] for name in archive.getnames()}
+    assert {"LICENSE", "CITATION.cff", "README.md", "CHANGELOG.md", "CONTRIBUTING.md"} <= found
     for folder in ("clvol", "cl", "scenes", "tests", "tools", "docs"):
         files = [p for p in (ROOT / folder).rglob("*") if p.is_file() and p.suffix != ".pyc"]
         missing = {p.relative_to(ROOT).as_posix() for p in files} - found
@@ -129,4 +147,6 @@ def test_every_dependency_has_a_lower_bound_that_can_be_asked_for() -> None:
     command = [sys.executable, str(ROOT / "tools" / "lowest.py")]
     outcome = subprocess.run(command, capture_output=True, text=True)
     assert outcome.returncode == 0, outcome.stderr
-    assert "numpy==2.0" in outcome.stdout.splitlines()
+    lines = outcome.stdout.splitlines()
+    assert "numpy==2.0" in lines
+    assert "matplotlib==3.9" in lines  # of an extra that the tests take in

@@ -31,6 +31,7 @@ from typing import Any
 
 import numpy as np
 
+from clvol.base.extras import need_matplotlib
 from clvol.base.output_files import check_room, kept_elsewhere, new_file, real, sync_folder
 from clvol.errors import OptionError
 from clvol.lab.comparison.figures import Comparison, Curve, Figures
@@ -47,6 +48,7 @@ _JSON, _HTML, _REFERENCE = "report.json", "report.html", "reference.exr"
 
 def check_folder(folder: str | os.PathLike[str]) -> None:
     """Raise OptionError now for a folder that `write_report` could not or should not replace later."""
+    need_matplotlib("a report")
     where, target = os.fspath(folder), real(folder)
     if target.exists() and not target.is_dir():
         raise OptionError("is a file, and a report is a folder", where=where)

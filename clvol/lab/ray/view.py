@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from clvol.base.extras import need_matplotlib
 from clvol.base.output_files import check_file, output_suffix, write_file
 from clvol.lab.ray.place import Place
 from clvol.lab.ray.walks import Watched, format_estimate
@@ -98,7 +99,8 @@ class RayView:
         return [f"Majorants of {', '.join(exceeded)} are bounds of the {shown} channel only."]
 
     def figure(self) -> Figure:
-        """The view as a matplotlib figure."""
+        """The view as a matplotlib figure; OptionError where matplotlib is not installed."""
+        need_matplotlib("the figure of a ray")
         from clvol.lab.ray.plot import draw
 
         return draw(self)
@@ -184,7 +186,8 @@ class RayView:
 
 def check_output(path: str | PathLike[str]) -> None:
     """Raise OptionError now for a path that `RayView.save` could not write later."""
-    output_suffix(path, SUFFIXES)
+    if output_suffix(path, SUFFIXES) != ".json":
+        need_matplotlib("the figure of a ray (all but .json)")
     check_file(path)
 
 
