@@ -12,9 +12,12 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
-from types import FrameType
+from typing import TYPE_CHECKING
 
 from clvol.version import __version__
+
+if TYPE_CHECKING:
+    from types import FrameType
 
 _EXPORTS = {
     "compare": "clvol.lab.comparison",

@@ -6,11 +6,14 @@ cell, and, by the slack below, for look-ups that rounding puts just outside it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import reduce
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 SLACK = np.float32(2.0**-10)
 """A float position on a ray may lie this fraction of a voxel beyond the cell it was computed for, in lattices

@@ -33,7 +33,9 @@ _CHUNK = 1 << 17
 
 @dataclass(frozen=True, eq=False)
 class Bvh:
-    """nodes : float32 (nodes, 8, 8), root first; row 6 holds uint32 references, [0, 7, 0] the triangle count.
+    """A hierarchy of boxes as the device has it.
+
+    nodes : float32 (nodes, 8, 8), root first; row 6 holds uint32 references, [0, 7, 0] the triangle count.
     packets : float32 (leaves, 10, 8), row 9 holds uint32 numbers of primitives.
     depth : nodes on the longest way from the root to a leaf.
     stack : entries that a traversal keeps at most.

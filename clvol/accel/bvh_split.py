@@ -21,7 +21,9 @@ _CHUNK = 1 << 18
 
 @dataclass(frozen=True, eq=False)
 class BinaryTree:
-    """box : float32 (6, nodes), rows lower x, y, z, -upper x, y, z; root first.
+    """A binary tree of boxes over primitives.
+
+    box : float32 (6, nodes), rows lower x, y, z, -upper x, y, z; root first.
     left : int32 (nodes,), the first of two neighbouring children; -1 in a leaf.
     first, count : int32 (nodes,), a leaf's primitives order[first : first + count].
     order : int32 (primitives,).

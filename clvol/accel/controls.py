@@ -129,8 +129,10 @@ def residual(
 
 
 def looseness(cells: CellBounds, kind: Control, majorant_scale: float = 1.0) -> np.ndarray:
-    """Scaled majorant minus the control's mean over the channels, (...): expected look-ups per optical
-    length.  The split cost of METHODS §5; never negative."""
+    """Expected look-ups per optical length, (...): scaled majorant less the channels' mean control.
+
+    The split cost of METHODS §5; never negative.
+    """
     majorant = scaled_majorant(cells.maximum, majorant_scale)
     if kind == "none":
         return majorant

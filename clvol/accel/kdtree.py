@@ -10,13 +10,15 @@ technique's (clvol.accel.controls): the majorant, less the control that decompos
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from clvol.accel.bounds import Bounds
 from clvol.accel.controls import Control, scaled_majorant
 from clvol.accel.kdtree_costs import DEEPER, LEAF, Boxes, Costs, Key, Level, weigh
+
+if TYPE_CHECKING:
+    from clvol.accel.bounds import Bounds
 
 MOST_CELLS = 64
 """Cells per axis of the finest lattice: all boxes of a 64³ lattice number 2 million."""

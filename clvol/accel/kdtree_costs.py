@@ -49,8 +49,10 @@ class Within(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """All boxes of one size in n lattices, and for each the cheapest cost, its leaf visits, its split:
-    (n, 2^a, 2^b, 2^c)."""
+    """All boxes of one size in n lattices, and for each the cheapest cost, its leaf visits, its split.
+
+    Arrays are (n, 2^a, 2^b, 2^c).
+    """
 
     boxes: Boxes
     cost: np.ndarray

@@ -7,16 +7,14 @@ what all walks through empty space and the costs of majorants go by.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from clvol.accel.bounds import Bounds, slackened
 from clvol.volumes.brick_samples import BOUND_CELLS, BRICK_CELLS
-from clvol.volumes.brick_tree import BrickTree
 from clvol.volumes.tree import (
     NODE_EDGE,
     Tier,
@@ -27,6 +25,11 @@ from clvol.volumes.tree import (
     rows_of,
     unique_places,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from clvol.volumes.brick_tree import BrickTree
 
 _CHUNK = 1024
 _CORNERS = np.array(list(np.ndindex(2, 2, 2)))
@@ -119,9 +122,11 @@ class SparseBounds:
         return Bounds(cells.minimum, cells.maximum, max(self.cells) * self.cell_size, cells.mean)
 
     def groups(self) -> Iterator[tuple[Cells, list[np.ndarray]]]:
-        """All cells that the lattice falls into, the large constant ones included, a bounded chunk at a time:
-        their bounds, (n, 8, 8, 8, channels), and along x, y, z their sides in cells of the lattice, as far as
-        they lie inside it, (n, 8, 8, 8) by broadcasting; 0 for what a node stands below."""
+        """All cells that the lattice falls into, the large constant ones included, a bounded chunk at a time.
+
+        Their bounds, (n, 8, 8, 8, channels), and along x, y, z their sides in cells of the lattice, as far as
+        they lie inside it, (n, 8, 8, 8) by broadcasting; 0 for what a node stands below.
+        """
         for tier in self.tiers:
             for first in range(0, len(tier.tier.nodes), _CHUNK):
                 rows = slice(first, first + _CHUNK)

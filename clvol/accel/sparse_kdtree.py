@@ -7,14 +7,18 @@ time and memory go with the blocks, not with the box.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from clvol.accel.bounds import Bounds
-from clvol.accel.controls import Control
 from clvol.accel.kdtree import LEAF_BITS, KdTree, build_kdtree, grow, tree_lattice
 from clvol.accel.kdtree_costs import Boxes, Costs, Key, Within, weigh
-from clvol.accel.sparse_bounds import BoundsTier, SparseBounds
 from clvol.volumes.tree import NODE_EDGE
+
+if TYPE_CHECKING:
+    from clvol.accel.controls import Control
+    from clvol.accel.sparse_bounds import BoundsTier, SparseBounds
 
 MOST_BLOCKS = 8192
 """Blocks of the finest lattice a tree is built over: 4 million cells."""

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
-from clvol.errors import Error
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from clvol.errors import Error
 
 _KINDS = {
     stat.S_IFDIR: "a folder",

@@ -11,14 +11,16 @@ import os
 import secrets
 import stat
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from os import PathLike
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 from clvol.base.files import other_kind
 from clvol.errors import OptionError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
 
 StrPath = str | PathLike[str]
 _NO_SYNC = (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP)

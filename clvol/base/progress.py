@@ -180,6 +180,7 @@ class RichProgress:
         return self
 
     def __call__(self, record: Progress) -> None:
+        """Show where the render is."""
         if self._bar is None or self._task is None:
             return
         self._bar.update(

@@ -6,14 +6,16 @@ import io
 import math
 import os
 import sys
-from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
 from clvol.base.interrupts import ENDING, interruptible
 from clvol.errors import DeviceError, Error, OptionError, printable, shortened
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
 
 USER_ERROR = 2
 LONGEST_LINE = 3000

@@ -1,4 +1,4 @@
-"""`clvol selftest`: does every way to render a scene make the same picture?"""
+"""`clvol selftest`: whether every way to render a scene makes the same picture."""
 
 from __future__ import annotations
 

@@ -50,10 +50,12 @@ class Device:
 
     @cached_property
     def is_cpu(self) -> bool:
+        """Whether it renders on a processor, whose threads this process counts as its own."""
         return self.info.kind == "CPU"
 
     @property
     def description(self) -> str:
+        """Name and platform, as users see them."""
         return f"{self.info.name} ({self.info.platform})"
 
     @cached_property

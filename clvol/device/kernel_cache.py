@@ -15,12 +15,15 @@ import sqlite3
 import struct
 import sys
 import tempfile
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from clvol.errors import DeviceError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 log = logging.getLogger("clvol")
 VARIABLE = "POCL_CACHE_DIR"

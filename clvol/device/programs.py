@@ -7,18 +7,22 @@ include path reaches the compiler, and drivers' caches see exactly what is compi
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from functools import cache
 from importlib import resources
+from typing import TYPE_CHECKING
 
 import pyopencl as cl
 
 from clvol import layout
-from clvol.device.device import Device
 from clvol.errors import DeviceError
 from clvol.planning import registry
-from clvol.planning.config import KernelConfig
 from clvol.tables.materials import BSDF_HEADERS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from clvol.device.device import Device
+    from clvol.planning.config import KernelConfig
 
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"')
 BUILD_OPTIONS = ("-cl-std=CL1.2", "-w")

@@ -170,8 +170,10 @@ def _fit(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def error_bias(dof: float) -> float:
-    """Mean of a standard error estimated with `dof` degrees of freedom over the true one, for normal means
-    (known as c4): 0.80 for 1, 0.92 for 3."""
+    """Mean of a standard error estimated with `dof` degrees of freedom over the true one.
+
+    For normal means (known as c4): 0.80 for 1, 0.92 for 3.
+    """
     if dof < 1:
         return math.nan
     if dof > 1000:

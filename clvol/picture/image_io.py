@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import logging
 import os
-from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from clvol.errors import OptionError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 log = logging.getLogger("clvol")
 
@@ -31,7 +33,10 @@ MAGENTA = (255, 0, 255)
 
 
 def split_channels(name: str, image: np.ndarray) -> dict[str, np.ndarray]:
-    """Name the planes of an image: (h, w) is `name`; (h, w, 3) is name.R, name.G, name.B; else name.0, …"""
+    """Name the planes of an image.
+
+    (h, w) is `name`; (h, w, 3) is name.R, name.G, name.B; else name.0, name.1, …
+    """
     if image.ndim == 2:
         return {name: image}
     count = image.shape[2]
@@ -161,9 +166,9 @@ def _exr_value(value: Any) -> int | float | str:
 
 
 def _text(value: Any) -> str:
-    """Metadata value as text: strings as they are, the rest as JSON where it can be said in JSON.
+    r"""Metadata value as text: strings as they are, the rest as JSON where it can be said in JSON.
 
-    Bytes of a file's name that are no UTF-8 become \\udcNN.
+    Bytes of a file's name that are no UTF-8 become \udcNN.
     """
     text = value if isinstance(value, str) else json.dumps(value, default=str)
     return text.encode("utf-8", "backslashreplace").decode()

@@ -10,13 +10,15 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from clvol.errors import OptionError, shown
 from clvol.picture.estimate import Estimate, error_bias
+
+if TYPE_CHECKING:
+    from os import PathLike
 
 Ranges = tuple[tuple[int, int], ...]
 """Sample ranges as (first, count), ascending, disjoint, not touching."""
@@ -132,8 +134,9 @@ class Result:
 
     @property
     def noise(self) -> float:
-        """Mean relative standard error of the image (`relative_noise`); nan, that is unknown, where no sample
-        met any light.
+        """Mean relative standard error of the image (`relative_noise`).
+
+        It is nan, that is unknown, where no sample met any light.
 
         Where all samples of each pixel are the same it is 0, unless paths crossed media and met nothing in
         them: then it is the bound `unseen_noise`.
@@ -145,8 +148,10 @@ class Result:
 
     @property
     def met_nothing(self) -> bool:
-        """Paths crossed media, as far as is known, and no collision was real: what these media do to the
-        picture has not been seen."""
+        """Paths crossed media, as far as is known, and no collision was real.
+
+        What these media do to the picture has not been seen.
+        """
         analytic = self.metadata.get("technique") == "analytic"
         crossed = analytic or self.stats.get("cells_crossed", 0) or self.stats.get("lookups", 0)
         return bool(crossed) and not self.stats.get("real_collisions", 0)

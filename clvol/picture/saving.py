@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import logging
 import secrets
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from clvol.base.output_files import (
     StrPath,
@@ -22,6 +19,10 @@ from clvol.errors import Error, OptionError
 from clvol.picture import image_io
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+
     from clvol.picture.result import Result
 
 log = logging.getLogger("clvol")
@@ -62,8 +63,10 @@ def encode(result: Result, suffix: str, exposure: float = 0.0) -> bytes:
 
 
 def save_all(result: Result, paths: Sequence[StrPath], exposure: float = 0.0) -> dict[StrPath, Error]:
-    """Write every picture that can be written; return what went wrong with the others, and where the picture
-    is then: in another of the files, or in one with a name of its own."""
+    """Write every picture that can be written; return what went wrong with the others.
+
+    The error also says where the picture is then: in another of the files, or in one with a name of its own.
+    """
     failed: dict[StrPath, str] = {}
     whole = ""
     for path in paths:
@@ -82,7 +85,6 @@ def save_all(result: Result, paths: Sequence[StrPath], exposure: float = 0.0) ->
 
 def _keep(result: Result, path: StrPath) -> str:
     """Where the picture is instead, as .exr; "" if there is no room for it anywhere."""
-
     try:
         data = encode(result, ".exr")
     except (Error, OSError, MemoryError):

@@ -113,8 +113,10 @@ def find_boundaries(scene: records.Scene) -> Boundaries:
 
 
 def _is_interval(shape: records.Shape, exteriors: set[int], holders: Counter[int]) -> bool:
-    """Whether the shape only holds a medium, in an interval of any ray; what several shapes hold and others
-    keep out has to be counted."""
+    """Whether the shape only holds a medium, in an interval of any ray.
+
+    What several shapes hold and others keep out has to be counted.
+    """
     return (
         shape.kind in CONVEX
         and isinstance(shape.bsdf, Null)
@@ -172,8 +174,10 @@ def _holders(found: Boundaries) -> dict[int, list[Boundary]]:
 
 
 def entry_bounds(scene: records.Scene, found: Boundaries) -> list[tuple[np.ndarray, np.ndarray]]:
-    """World bounds of each medium: of the shape, or of all boundaries that hold it; infinite where it is
-    everywhere."""
+    """World bounds of each medium: of the shape, or of all boundaries that hold it.
+
+    They are infinite where a medium is everywhere.
+    """
     boxes, holders = [], _holders(found)
     for number, entry in enumerate(found.entries):
         if entry.everywhere:
@@ -187,8 +191,10 @@ def entry_bounds(scene: records.Scene, found: Boundaries) -> list[tuple[np.ndarr
 
 
 def scene_sphere(scene: records.Scene, found: Boundaries) -> tuple[np.ndarray, float]:
-    """Centre and radius of a sphere round every medium and surface: what rays can meet (else the camera's
-    place)."""
+    """Centre and radius of a sphere round all that rays can meet, every medium and surface.
+
+    The camera's place where there is nothing.
+    """
     shapes = [scene.shapes[n] for n in found.surfaces]
     shapes += [e.shape for e in found.entries if e.shape is not None]
     corners = [corner for s in shapes for corner in shape_bounds(s)]
@@ -199,8 +205,10 @@ def scene_sphere(scene: records.Scene, found: Boundaries) -> tuple[np.ndarray, f
 
 
 def may_overlap(scene: records.Scene, found: Boundaries) -> bool:
-    """Conservative: whether two media may be present at one point, which they cannot where their bounds are
-    apart, or where all that holds the one keeps out the other."""
+    """Whether two media may be present at one point; conservative.
+
+    They cannot where their bounds are apart, or where all that holds the one keeps out the other.
+    """
     boxes = np.array(entry_bounds(scene, found)).reshape(-1, 2, 3)
     lower, upper, holders = boxes[:, 0], boxes[:, 1], _holders(found)
     for a in range(len(boxes)):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from clvol.scene.materials import (
     Bitmap,
     Bsdf,
@@ -18,10 +20,12 @@ from clvol.scene.materials import (
     Spectrum,
     TwoSided,
 )
-from clvol.scene.reader import Reader
 from clvol.scene.refraction import INDICES, METALS
 from clvol.scene.texture import constant, texture
 from clvol.scene.vocabulary import did_you_mean, join_hints, listed
+
+if TYPE_CHECKING:
+    from clvol.scene.reader import Reader
 
 TRANSMISSIVE = (Null, Dielectric, RoughDielectric)
 DISTRIBUTIONS = ("beckmann", "ggx")
@@ -154,7 +158,7 @@ def _indices(reader: Reader, interior: str, differ: bool = False) -> tuple[float
 
 
 def _metal(reader: Reader) -> tuple[Spectrum, Spectrum]:
-    """eta and k; of a perfect mirror where nothing is given."""
+    """The indices eta and k; of a perfect mirror where nothing is given."""
     name = reader.string("material", "none")
     given = [key for key in ("eta", "k") if reader.has(key)]
     if given and reader.has("material"):

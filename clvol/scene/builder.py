@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from clvol.errors import SceneError
 from clvol.scene.nodes import MAX_DEPTH, Node
 from clvol.scene.reader import Reader
 from clvol.scene.vocabulary import LATER, did_you_mean, join_hints, listed
-from clvol.volumes.grid import Grid
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from clvol.volumes.grid import Grid
 
 PluginTable = Mapping[str, Mapping[str, Callable[[Reader], object]]]
 

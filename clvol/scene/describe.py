@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,9 +14,12 @@ from clvol.scene.materials import Bsdf, Dielectric, Mask, Null, TwoSided
 from clvol.volumes import VdbGridInfo, list_vdb, read_vdb, read_volume
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
 
 def format_bytes(count: float) -> str:
-    """Number of bytes as "512 B", "1.5 MiB", …"""
+    """Number of bytes as people write it: "512 B", "1.5 MiB"."""
     for unit in ("B", "KiB", "MiB", "GiB"):
         if count < 1024 or unit == "GiB":
             break

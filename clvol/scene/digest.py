@@ -13,8 +13,10 @@ take seconds."""
 
 
 def scene_digest(scene: object) -> str:
-    """16 hexadecimal digits that depend on every record of the scene, but for where it was read from,
-    its sample count and its seed."""
+    """16 hexadecimal digits that depend on every record of the scene.
+
+    All but where it was read from, its sample count and its seed.
+    """
     state = hashlib.blake2b(digest_size=8)
     _feed(state, scene)
     return state.hexdigest()

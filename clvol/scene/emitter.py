@@ -138,8 +138,10 @@ def area(reader: Reader) -> AreaLight:
 
 
 def _accept_common(reader: Reader) -> None:
-    """What every emitter may carry: a share of the samples, and the medium that it is in, which is found from
-    the shapes (Mitsuba's path tracers do not look at it)."""
+    """Accept what every emitter may carry: a share of the samples, and the medium that it is in.
+
+    The medium is found from the shapes (Mitsuba's path tracers do not look at it).
+    """
     if reader.number("sampling_weight", 1.0, minimum=0.0) == 0:
         reader.fail("sampling_weight is 0: Mitsuba never samples such a light", "sampling_weight")
     medium = reader.only_child("medium")

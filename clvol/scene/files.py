@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from clvol.base.files import other_kind
 from clvol.errors import SceneError
-from clvol.scene.reader import Reader
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from clvol.scene.reader import Reader
 
 
 def find(name: str, folders: Sequence[Path], where: str) -> Path:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from clvol.scene.reader import Reader
 from clvol.scene.records import Integrator
+
+if TYPE_CHECKING:
+    from clvol.scene.reader import Reader
 
 CHOICES = (
     "technique",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from clvol.errors import SceneError, shown
 from clvol.scene import bsdf, emitter, integrator, medium, phase, sensor, shape, texture, volume
@@ -15,6 +15,9 @@ from clvol.scene.nodes import Node, from_dict
 from clvol.scene.records import ConstantEmitter, EnvmapEmitter, Integrator, Scene, Shape
 from clvol.scene.vocabulary import listed
 from clvol.scene.xml import read_xml
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 PLUGINS: PluginTable = {
     "integrator": {

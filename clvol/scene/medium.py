@@ -74,8 +74,10 @@ def _extinction(reader: Reader, homogeneous: bool) -> tuple[Volume, Spectrum]:
 
 
 def _reduced(reader: Reader, volume: GridVolume) -> tuple[GridVolume, Spectrum]:
-    """The volume in one channel and its colour where its channels are proportional, so that one look-up
-    serves all; else as it is.  What media share stays shared."""
+    """The volume in one channel and its colour where its channels are proportional; else as it is.
+
+    One look-up then serves all.  What media share stays shared.
+    """
     done = reader.build.reduced
     if id(volume.grid) not in done:
         done[id(volume.grid)] = proportional_channels(volume.grid)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from clvol.scene.records import Mesh
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 log = logging.getLogger("clvol")
 
@@ -85,8 +88,11 @@ def _chunks(count: int) -> Iterator[slice]:
 
 
 def _cross(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Normals with the length of twice the area, float64 (m, 3); 0 exactly where there is no area, since the
-    products of differences of floats are exact in double."""
+    """Normals with the length of twice the area, float64 (m, 3).
+
+    They are exactly 0 where there is no area, since the products of differences of floats are exact in
+    double.
+    """
     a, b, c = (vertices[faces[:, n]].astype(np.float64) for n in range(3))
     return np.cross(b - a, c - a)
 

@@ -6,6 +6,7 @@ import io
 import logging
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,7 +15,9 @@ from clvol.scene.gltf import plain_gltf
 from clvol.scene.mesh import RawMesh, build_mesh
 from clvol.scene.obj import read_obj
 from clvol.scene.ply import read_ply
-from clvol.scene.records import Mesh
+
+if TYPE_CHECKING:
+    from clvol.scene.records import Mesh
 
 log = logging.getLogger("clvol")
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from clvol.scene.mesh import merged_vertices
-from clvol.scene.records import Mesh
+
+if TYPE_CHECKING:
+    from clvol.scene.records import Mesh
 
 _MOST_TESTS = 1_000
 """Parts that may lie inside of others are looked at up to so many pairs; beyond, none is turned."""
@@ -105,8 +108,11 @@ def _volumes(mesh: Mesh) -> np.ndarray:
 
 
 def _is_inside(point: np.ndarray, triangles: np.ndarray) -> bool:
-    """Whether a closed part is round a point: its winding number there, by solid angles (Van Oosterom and
-    Strackee 1983), which no ray through an edge can get wrong."""
+    """Whether a closed part is round a point.
+
+    Its winding number there, by solid angles (Van Oosterom and Strackee 1983), which no ray through an edge
+    can get wrong.
+    """
     a, b, c = (triangles[:, n].astype(np.float64) - point for n in range(3))
     la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
     volume = (a * np.cross(b, c)).sum(axis=1)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from clvol.scene.reader import Reader
 from clvol.scene.records import BlendPhase, Phase, PhaseFunction
+
+if TYPE_CHECKING:
+    from clvol.scene.reader import Reader
 
 MAX_LOBES = 64
 """Most phase functions that a mixture may hold, counted with repetition: more than any scene has, and

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import mapbox_earcut
 import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 log = logging.getLogger("clvol")
 
@@ -59,8 +62,11 @@ def _fans(sizes: np.ndarray) -> np.ndarray:
 
 
 def _fans_that_cover(fans: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which polygons their fans, (t, 3, 3), cover: all triangles face one way and go round once at most; and
-    the normals of the polygons, twice their area long.  Triangles of two equal corners count for nothing."""
+    """Which polygons their fans, (t, 3, 3), cover; and the polygons' normals, twice their area long.
+
+    A fan covers where all triangles face one way and go round once at most.  Triangles of two equal corners
+    count for nothing.
+    """
     first = np.cumsum(counts) - counts
     a, b, c = (np.ascontiguousarray(fans[:, n].T, np.float64) for n in range(3))
     u, v = b - a, c - a
@@ -129,8 +135,10 @@ def _between(flat: np.ndarray, a: int, middle: int, b: int) -> bool:
 
 
 def distinct(columns: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """The first corner of each combination of non-negative numbers, in the order of first use, and which
-    combination each corner is."""
+    """The first corner of each combination of non-negative numbers, and which combination each corner is.
+
+    Combinations are in the order of first use.
+    """
     key = columns[0]
     for column in columns[1:]:
         key = np.unique(key, return_inverse=True)[1].astype(np.int64) * (int(column.max()) + 1) + column

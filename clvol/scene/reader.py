@@ -6,23 +6,25 @@ A builder asks for every parameter it knows and then calls `finish`, which refus
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from clvol.base.masks import as_array, masked_count
 from clvol.errors import SceneError, shown
 from clvol.scene import spectra
 from clvol.scene.nodes import NAMELESS, Node
-from clvol.scene.records import Spectrum
 from clvol.scene.transforms import as_matrix
 from clvol.scene.vocabulary import did_you_mean, join_hints, listed
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
     from clvol.scene.builder import Builder
+    from clvol.scene.records import Spectrum
 
 log = logging.getLogger("clvol")
 

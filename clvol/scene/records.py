@@ -7,13 +7,17 @@ vectors from local to world space (``world = M @ local``).
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from clvol.scene.materials import Bsdf, Null
-from clvol.volumes.grid import Grid
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from clvol.volumes.grid import Grid
 
 Spectrum = tuple[float, ...]
 """One number (grey) or three (linear sRGB)."""
@@ -252,8 +256,11 @@ class PointEmitter:
 
 @dataclass(frozen=True, eq=False)
 class SpotEmitter:
-    """Point light along local +z of `to_world`: `intensity` up to `beam_width` off the axis, falling in a
-    straight line with the angle to 0 at `cutoff_angle` (both in degrees)."""
+    """Point light along local +z of `to_world`.
+
+    It has `intensity` up to `beam_width` off the axis, falling in a straight line with the angle to 0 at
+    `cutoff_angle` (both in degrees).
+    """
 
     intensity: Spectrum
     to_world: np.ndarray

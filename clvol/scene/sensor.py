@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.scene.reader import Reader
 from clvol.scene.records import Film, Perspective, ReconstructionFilter
+
+if TYPE_CHECKING:
+    from clvol.scene.reader import Reader
 
 MAX_SIDE = 65536
 MAX_PIXELS = 2**28

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,9 +13,11 @@ from clvol.scene.files import find_parameter
 from clvol.scene.material_facts import has_textures
 from clvol.scene.materials import Diffuse
 from clvol.scene.mesh_files import read_mesh
-from clvol.scene.reader import Reader
 from clvol.scene.records import Medium, Mesh, Shape
 from clvol.scene.transforms import check_size, keeps_angles, scale, translate
+
+if TYPE_CHECKING:
+    from clvol.scene.reader import Reader
 
 log = logging.getLogger("clvol")
 
@@ -91,8 +94,10 @@ def mesh(reader: Reader) -> Shape:
 
 
 def _frame(z: np.ndarray) -> np.ndarray:
-    """Rotation that turns local +z onto the unit vector `z` (Duff et al. 2017), so that u = 0 lies where
-    Mitsuba's cylinders have it."""
+    """Rotation that turns local +z onto the unit vector `z` (Duff et al. 2017).
+
+    u = 0 lies where Mitsuba's cylinders have it.
+    """
     sign = np.copysign(1.0, z[2])
     a = -1 / (sign + z[2])
     b = z[0] * z[1] * a

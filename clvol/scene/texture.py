@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from clvol.base.rows import bands
@@ -9,7 +11,9 @@ from clvol.scene.files import find_parameter
 from clvol.scene.image import image_from_array, read_image
 from clvol.scene.materials import Bitmap, Checkerboard, Texture
 from clvol.scene.nodes import Node
-from clvol.scene.reader import Reader
+
+if TYPE_CHECKING:
+    from clvol.scene.reader import Reader
 
 NEGLIGIBLE = 1e-4
 """How far texels may lie beyond 0..1: rounding of converted pictures, which is cut."""

@@ -43,9 +43,11 @@ def widths(box: np.ndarray) -> np.ndarray:
 
 
 def thin_media(scene: records.Scene, found: Boundaries) -> list[bool]:
-    """Whether each medium is so thin that rays are measured from a point close to it: a shape or box that
-    bounds it in closed form is thinner than THIN of what rays travel.  What surfaces bound is measured where
-    rays meet them."""
+    """Whether each medium is so thin that rays are measured from a point close to it.
+
+    It is where a shape or box that bounds it in closed form is thinner than THIN of what rays travel.  What
+    surfaces bound is measured where rays meet them.
+    """
     centre, radius = scene_sphere(scene, found)
     reach = radius + float(np.linalg.norm(scene.sensor.to_world[:3, 3] - centre))
     return [
@@ -101,8 +103,10 @@ def _coordinates(box: np.ndarray, centre: np.ndarray) -> np.ndarray:
 
 
 def mean_chord(shape: records.Shape) -> float:
-    """Mean length of rays through a closed convex shape: four times its volume over its area (Cauchy); 0 for
-    one without an inside."""
+    """Mean length of rays through a closed convex shape: four times its volume over its area (Cauchy).
+
+    It is 0 for one without an inside.
+    """
     linear = shape.to_world[:3, :3]
     if shape.kind == "sphere":
         return float(4 / 3 * np.linalg.svd(linear, compute_uv=False).min())

@@ -5,11 +5,15 @@ They are plain float64 arrays; anything with a 4x4 ``.matrix`` (as ``mi.ScalarTr
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from numpy.typing import ArrayLike
 
 from clvol.base.masks import as_array
 from clvol.errors import SceneError, shown
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 SMALLEST, LARGEST = 1e-18, 1e18
 """Sizes that can be rendered: their squares are floats."""

@@ -6,10 +6,13 @@ What is supported is not listed here: the plugin tables and the parameters that 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable
 from difflib import get_close_matches
+from typing import TYPE_CHECKING
 
 from clvol.errors import shortened
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 LATER: dict[str, tuple[str, ...]] = {
     "integrator": ("direct", "aov", "depth", "ptracer"),
@@ -34,7 +37,7 @@ MOST_COMPARED, MOST_LISTED = 500, 64
 
 
 def did_you_mean(name: str, candidates: Iterable[str]) -> str:
-    """ "did you mean 'x'?" when a candidate is close to `name`, else an empty string.
+    """The hint "did you mean 'x'?" when a candidate is close to `name`, else an empty string.
 
     Of very many candidates those that begin most like `name` are compared.
     """

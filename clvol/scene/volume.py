@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from clvol.scene.files import find_parameter
-from clvol.scene.reader import Reader
 from clvol.scene.records import ConstVolume, GridVolume, Volume
 from clvol.scene.transforms import scale, translate
 from clvol.volumes import dense_from_array, read_vdb, read_volume
 from clvol.volumes.files import place
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
+
+if TYPE_CHECKING:
+    from clvol.scene.reader import Reader
 
 log = logging.getLogger("clvol")
 

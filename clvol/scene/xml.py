@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
 from numbers import Real
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -30,6 +29,10 @@ from clvol.scene.xml_values import (
     parse_xyz,
 )
 from clvol.volumes.read import CONVERSIONS, SUFFIXES
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
 
 PLUGIN_TAGS = (
     *("scene", "shape", "bsdf", "medium", "volume", "phase", "emitter"),
@@ -150,8 +153,7 @@ class _XmlReader:
         return {name: self.substitute(text, element) for name, text in element.attributes.items()}
 
     def substitute(self, text: str, element: Element) -> str:
-        """`text` with each $name replaced by its value, and each \\$ by a dollar sign."""
-
+        r"""`text` with each $name replaced by its value, and each \$ by a dollar sign."""
         length = 0
 
         def value(match: re.Match[str]) -> str:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 from xml.parsers import expat
 
 from clvol.base.files import open_regular
 from clvol.errors import SceneError
 from clvol.scene.nodes import MAX_DEPTH
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 @dataclass

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
 from clvol.errors import SceneError, shortened
-from clvol.scene.xml_tree import Element
+
+if TYPE_CHECKING:
+    from clvol.scene.xml_tree import Element
 
 _FLOAT = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _LONGEST_NUMBER = 1000

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from clvol.planning.features import is_homogeneous
-from clvol.scene import records
-from clvol.tables.prepare import PreparedScene
+
+if TYPE_CHECKING:
+    from clvol.scene import records
+    from clvol.tables.prepare import PreparedScene
 
 FAR_APART = 1e4
 """Ratio of two channels' largest extinctions in a medium beyond which one path does not serve both.  Much of

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from numpy.typing import ArrayLike
 
 from clvol.scene.spectra import XYZ_TO_SRGB, observer
 from clvol.tables.environment import luminance
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 SECOND_RADIATION_NM_K = 1.438776877e7
 """Planck's h c / k, in nm K."""

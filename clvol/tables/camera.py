@@ -11,17 +11,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.scene.records import Film, Perspective
+if TYPE_CHECKING:
+    from clvol.scene.records import Film, Perspective
 
 
 @dataclass(frozen=True, eq=False)
 class CameraRays:
-    """Ray of position (x, y), in pixels from the corner of the film's window: origin = position + x dx + y dy
-    (relative to the scene's centre), direction ∝ base + x base_dx + y base_dy.  `far`: depth of the far plane
-    beyond the origins.
+    """Ray of position (x, y), in pixels from the corner of the film's window.
+
+    origin = position + x dx + y dy (relative to the scene's centre), direction ∝ base + x base_dx + y
+    base_dy. `far`: depth of the far plane beyond the origins.
 
     A point (u, v) of the unit disk is l = u lens_x + v lens_y of a thin lens; it moves the origin by
     lens_start l and the direction, before it is normalised, by -lens_bend l.

@@ -5,14 +5,16 @@ Pure functions from records to arrays.  An environment is emitter 0; next-event 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
 from clvol import layout
 from clvol.scene import records
 from clvol.tables.environment import envmap_distribution, luminance, mean_luminance
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 QUADRICS = ("sphere", "disk", "cylinder")
 """Kinds of shape that stay what they are on the device; all others are triangles there."""

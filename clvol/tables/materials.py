@@ -6,8 +6,8 @@ Nothing here needs a device.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from clvol.scene.material_facts import Side, bsdf_sides, side_kind
 from clvol.scene.materials import Bitmap, Bsdf, Checkerboard, Spectrum, Texture
 from clvol.tables.coat import MIN_ALPHA, coat_table, diffuse_reflectance
 from clvol.tables.textures import TextureTable, mean_color
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 BSDF_HEADERS = {
     "DIFFUSE": "bsdf/diffuse.h",

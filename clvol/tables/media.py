@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from clvol import layout
@@ -12,7 +14,9 @@ from clvol.scene.phase import phase_lobes
 from clvol.scene.thinness import thin_media
 from clvol.tables.apart import peak_extinction
 from clvol.tables.blackbody import blackbody_rgb
-from clvol.tables.prepare import PreparedScene, PreparedVolume
+
+if TYPE_CHECKING:
+    from clvol.tables.prepare import PreparedScene, PreparedVolume
 
 BOUND_SLACK = 1e-5
 """Share of its size by which a medium's world box exceeds the boundaries that hold it."""
@@ -107,8 +111,11 @@ def voxel_edges(volume: PreparedVolume) -> np.ndarray:
 
 
 def mean_incident_radiance(scene: records.Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Mean over all directions of the radiance that arrives from infinity, of the sky and of suns, which no
-    ray meets, float64 (3,); 0 where a limit of depth keeps most of it from the picture."""
+    """Mean over all directions of the radiance that arrives from infinity, float64 (3,).
+
+    That of the sky and of suns, which no ray meets; 0 where a limit of depth keeps most of it from the
+    picture.
+    """
     sky, suns = np.zeros(3), np.zeros(3)
     if 0 <= scene.integrator.max_depth < 3:
         return sky, suns
@@ -135,8 +142,11 @@ def most_depth(
 
 
 def expected_albedo(medium: records.Medium) -> np.ndarray:
-    """Root of the share of diffuse light that a half-space of the medium returns (van de Hulst 1980), a guess
-    between that and the 1 of its rim, float64 (3,); 0 where the albedo varies."""
+    """Root of the share of diffuse light that a half-space of the medium returns, float64 (3,).
+
+    After van de Hulst 1980; the root is a guess between that and the 1 of its rim.  It is 0 where the albedo
+    varies.
+    """
     if not isinstance(medium.albedo, records.ConstVolume):
         return np.zeros(3)
     s = np.sqrt(1.0 - _rgb(medium.albedo.value))

@@ -7,10 +7,12 @@ negatively, and all are scaled by what the magnitude integrates to, relative to 
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.scene.records import ReconstructionFilter
+if TYPE_CHECKING:
+    from clvol.scene.records import ReconstructionFilter
 
 FILTER_BINS = 1024
 SIGNED = ("mitchell", "lanczos")

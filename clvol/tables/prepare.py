@@ -209,8 +209,7 @@ def _choose_majorants(
 
 
 def _longest(medium: records.Medium, volume: PreparedVolume) -> np.ndarray:
-    """Optical depth that the longest way through the volume's box has at density 1, float64 (channels of the
-    volume,)."""
+    """Optical depth of the longest way through the volume's box at density 1, float64 (channels,)."""
     edges = np.linalg.inv(volume.world_to_index)[:3, :3] * volume.bricks.size
     scale = np.array(medium.scale, np.float64)
     own = scale if volume.bricks.channels == len(scale) else scale.max()

@@ -8,18 +8,21 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from clvol import layout
 from clvol.accel.bvh import Bvh, build_bvh, check_mesh, drop_degenerate
 from clvol.errors import SceneError
-from clvol.scene import records
 from clvol.scene.boundaries import Boundaries, shape_bounds
 from clvol.scene.material_facts import is_transmissive, passes_light
 from clvol.scene.mesh import mesh_flaws
 from clvol.scene.orientation import facing_outwards
 from clvol.scene.primitives import canonical_mesh
+
+if TYPE_CHECKING:
+    from clvol.scene import records
 
 log = logging.getLogger("clvol")
 

@@ -32,8 +32,10 @@ class TextureTable:
         self._used = 0
 
     def add(self, texture: Bitmap | Checkerboard, as_number: bool = False) -> int:
-        """Number of `texture`; `as_number`: of the one number that Mitsuba makes of each colour, which is the
-        luminance in a bitmap and the mean elsewhere."""
+        """Number of `texture`; `as_number`: of the one number that Mitsuba makes of each colour.
+
+        That is the luminance in a bitmap and the mean elsewhere.
+        """
         key = (texture, as_number)
         if key not in self._numbers:
             self._numbers[key] = len(self.records)

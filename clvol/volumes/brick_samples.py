@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.volumes.grid import SparseGrid
 from clvol.volumes.sparse_places import BRICK_CELLS, SparsePlaces
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from clvol.volumes.grid import SparseGrid
 
 BRICK_EDGE = BRICK_CELLS + 1
 BRICK_SAMPLES = BRICK_EDGE**3
@@ -42,8 +46,10 @@ def half_means(samples: np.ndarray) -> np.ndarray:
 
 
 def sparse_lattice(grid: SparseGrid) -> tuple[tuple[int, int, int], tuple[int, int, int]]:
-    """Samples per axis and index of the first sample, x, y, z: the active box and one voxel all round, its
-    start moved down to a leaf's."""
+    """Samples per axis and index of the first sample, x, y, z.
+
+    The active box and one voxel all round, its start moved down to a leaf's.
+    """
     box = grid.active_box.astype(np.int64)
     lower = (box[0] - 1) // BRICK_CELLS * BRICK_CELLS
     return tuple(int(n) for n in box[1] + 2 - lower), tuple(int(n) for n in lower)

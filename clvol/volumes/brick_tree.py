@@ -7,8 +7,8 @@ On the host a place that is kept takes 92 bytes, and as much again while it is f
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,8 +22,6 @@ from clvol.volumes.brick_samples import (
     sparse_lattice,
 )
 from clvol.volumes.files import place
-from clvol.volumes.grid import SparseGrid
-from clvol.volumes.sparse_places import SparsePlaces
 from clvol.volumes.tree import (
     NODE_ENTRIES,
     Tier,
@@ -34,6 +32,12 @@ from clvol.volumes.tree import (
     levels_over,
     rows_of,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from clvol.volumes.grid import SparseGrid
+    from clvol.volumes.sparse_places import SparsePlaces
 
 COMPACT_BRICKS = 1 << 17
 """A box of no more brick places than this (a dense top grid of 512 KiB) has a dense top grid in any case."""

@@ -10,8 +10,8 @@ the extrema.  Where few places of a large sparse grid hold anything, it is a tre
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,6 +31,9 @@ from clvol.volumes.brick_tree import BrickTree, build_tree, check_extent, is_sca
 from clvol.volumes.files import place
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
 from clvol.volumes.sparse_places import SparsePlaces
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 __all__ = ["BOUND_CELLS", "BRICK_CELLS", "BRICK_SAMPLES", "BrickMap", "BrickTree", "build_bricks"]
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from clvol.errors import VolumeError
 from clvol.volumes.files import place
 from clvol.volumes.grid import DenseGrid, Grid
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 # Samples looked at together: the largest temporary is one mask of them.
 SLAB = 1 << 22

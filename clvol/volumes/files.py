@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +13,9 @@ import numpy.typing as npt
 from clvol.base.files import open_regular
 from clvol.base.memory import available_memory
 from clvol.errors import VolumeError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 TRUNCATED = "the file is truncated or damaged: copy or export it again"
 

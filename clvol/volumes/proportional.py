@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from clvol.volumes.check import SLAB
-from clvol.volumes.grid import DenseGrid
+
+if TYPE_CHECKING:
+    from clvol.volumes.grid import DenseGrid
 
 TOLERANCE = 2.0**-20
 """Largest relative deviation from proportionality: sixteen roundings of a float."""

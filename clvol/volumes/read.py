@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from clvol.base.files import other_kind
 from clvol.errors import VolumeError
 from clvol.volumes.files import NANOVDB
-from clvol.volumes.grid import Grid
 from clvol.volumes.numpy_files import read_numpy
 from clvol.volumes.vdb import read_vdb
 from clvol.volumes.vol import read_vol
+
+if TYPE_CHECKING:
+    import os
+
+    from clvol.volumes.grid import Grid
 
 SUFFIXES = (".vdb", ".vol", ".npy", ".npz")
 CONVERSIONS = {".nvdb": NANOVDB}

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import chain
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from clvol.errors import VolumeError
 from clvol.volumes.files import place
-from clvol.volumes.grid import SparseGrid
 from clvol.volumes.tree import keys, rows_of, unique_places
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from clvol.volumes.grid import SparseGrid
 
 BRICK_CELLS = 8
 MOST_PLACES = 1 << 24

@@ -7,10 +7,13 @@ takes 2 KiB on the device (cl/geometry/lattice_tree.h).  Places are z, y, x thro
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
 
 NODE_EDGE = 8
 NODE_ENTRIES = NODE_EDGE**3

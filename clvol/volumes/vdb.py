@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import logging
-import os
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from clvol.volumes.vdb_header import (
 )
 from clvol.volumes.vdb_stream import VdbStream, open_vdb
 from clvol.volumes.vdb_tree import VdbTree
+
+if TYPE_CHECKING:
+    import os
 
 log = logging.getLogger("clvol")
 

@@ -6,13 +6,16 @@ import itertools
 import re
 import struct
 import warnings
-from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from clvol.volumes.files import NANOVDB
 from clvol.volumes.vdb_stream import ACTIVE_MASK, BLOSC, ZIP, VdbStream
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 MAGIC = struct.pack("<q", 0x56444220)
 OLDEST_VERSION, NEWEST_VERSION, WARNED_VERSION = 222, 224, 225

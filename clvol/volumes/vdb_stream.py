@@ -5,15 +5,17 @@ from __future__ import annotations
 import os
 import struct
 import zlib
-from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import BinaryIO, NoReturn
+from typing import TYPE_CHECKING, BinaryIO, NoReturn
 
 import blosc
 from blosc.blosc_extension import error as BloscError  # noqa: N812
 
 from clvol.errors import VolumeError
 from clvol.volumes.files import TRUNCATED, open_binary
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 ZIP, ACTIVE_MASK, BLOSC = 1, 2, 4
 BLOSC_FORMAT = 2
