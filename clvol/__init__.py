@@ -26,7 +26,7 @@ _EXPORTS = {
     "load_dict": "clvol.scene",
     "load_file": "clvol.scene",
     "look_at": "clvol.scene",
-    "merge": "clvol.picture.result",
+    "merge": "clvol.picture.merging",
     "OptionError": "clvol.errors",
     "render": "clvol.api",
     "RenderError": "clvol.errors",

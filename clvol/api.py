@@ -20,6 +20,7 @@ from clvol.picture.result import Result
 from clvol.planning import registry
 from clvol.planning.choices import Choices
 from clvol.rendering.adaptive import TargetRender
+from clvol.rendering.outcome import make_result
 from clvol.rendering.session import MAX_SAMPLES, Session
 from clvol.scene.records import Scene
 
@@ -127,7 +128,7 @@ def render(
             else:
                 done = TargetRender(session, target_error, spp).run(time_limit, callback, interrupt.urgency)
             interrupt.keep()
-        result = session.result(first, done)
+        result = make_result(session, first, done)
         result.stats["interrupted"] = interrupt.asked()
     if target_error is not None:
         result.metadata["target_error"] = target_error

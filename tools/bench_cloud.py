@@ -13,6 +13,7 @@ from mitsuba_side import REQUIREMENT, MitsubaSide, mitsuba_python
 from scene_options import OpenScene, open_scene
 
 from clvol.picture.result import Result
+from clvol.rendering.outcome import make_result
 from clvol.version import __version__
 
 EFFICIENCY_TARGET = 8.0
@@ -44,8 +45,8 @@ def timed_render(opened: OpenScene, spp: int, seed: int) -> tuple[Result, float,
     """Result, CPU seconds and wall seconds of a render, kernels built and loaded before."""
     session = opened.session(seed)
     wall, cpu = time.perf_counter(), time.process_time()
-    done = session.run(0, spp, None, None, lambda: False)
-    result = session.result(0, done)
+    done = session.run(0, spp)
+    result = make_result(session, 0, done)
     return result, time.process_time() - cpu, time.perf_counter() - wall
 
 

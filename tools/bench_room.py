@@ -8,6 +8,8 @@ from bench_cloud import Z_LIMIT, agrees, measure_cloud, show_cloud
 from bench_tables import Figures, Row, at_least, ranged, show
 from scene_options import open_scene
 
+from clvol.rendering.outcome import make_result
+
 ROOM = str(Path(__file__).resolve().parent.parent / "scenes" / "room.xml")
 EFFICIENCY_TARGET = 5.0
 
@@ -15,10 +17,10 @@ EFFICIENCY_TARGET = 5.0
 def stage_seconds(scene: str, res: int, choices: dict[str, str], device: str | None) -> Figures:
     """Device seconds of each stage in one render, kernels built and loaded before."""
     opened = open_scene(scene, {"res": res}, choices, device)
-    opened.session(0).run(0, 1, None, None, lambda: False)
+    opened.session(0).run(0, 1)
     session = opened.session(1)
-    done = session.run(0, 16, None, None, lambda: False)
-    stats = session.result(0, done).stats["seconds"]
+    done = session.run(0, 16)
+    stats = make_result(session, 0, done).stats["seconds"]
     return {stage: stats[stage] for stage in opened.config().stages}
 
 

@@ -19,6 +19,7 @@ from efficiency import Rounds, efficiency_ratio, image_mean, pixel_variance, z_s
 
 from clvol.device.device import open_device
 from clvol.planning.choices import Choices, prepare_for
+from clvol.rendering.outcome import make_result
 from clvol.rendering.session import Session
 from clvol.scene import load_file
 from clvol.scene.records import ConstVolume, Scene
@@ -43,9 +44,9 @@ def timed(device, scene: Scene, choices: Choices, spp: int, seed: int):
     """Result and CPU seconds of a render, kernels built before."""
     session = Session.open(device, prepare_for(scene, choices), choices, seed)
     started = time.process_time()
-    done = session.run(0, spp, None, None, lambda: False)
+    done = session.run(0, spp)
     cpu = time.process_time() - started
-    return session.result(0, done), cpu
+    return make_result(session, 0, done), cpu
 
 
 def measure_chromatic(res: int, spp: int, rounds: int, technique: str, device: str | None) -> Figures:

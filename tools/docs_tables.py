@@ -16,7 +16,8 @@ from pilot import HEADER, HOPELESS, Tested
 
 import clvol
 from clvol.device.device import open_device
-from clvol.lab.comparison.figures import Comparison, Figures
+from clvol.lab.comparison.figures import Figures
+from clvol.lab.comparison.result import Comparison
 from clvol.planning.registry import TECHNIQUES, TRANSMITTANCES
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -180,7 +180,7 @@ def render(
             from clvol.lab.repeat import with_definitions
 
             result.metadata["repeat"] = with_definitions(result.metadata["repeat"], dict(definitions))
-        failures = save_all(result, outputs, exposure)
+        failures = save_all(lambda suffix: result.encode(suffix, exposure), outputs)
     written = [output for output in outputs if output not in failures]
     if result.stats["interrupted"]:
         saved = ", saved what there is" if written else ""

@@ -15,7 +15,7 @@ import numpy as np
 from clvol.device.device import Device
 from clvol.lab.agreement import ROUNDING, region_sums
 from clvol.lab.trials import Trial
-from clvol.rendering.outcome import LARGE_WEIGHT
+from clvol.rendering.outcome import LARGE_WEIGHT, make_result
 
 DEVIATIONS, TILE_DEVIATIONS = 3.0, 4.0
 """By so many standard errors a picture's mean, and one of its many tiles, may be darker than another's."""
@@ -77,9 +77,9 @@ class Candidate:
         session = self.trial.session
         session.restart(seed)
         started = clock(session.device)
-        done = session.run(0, spp, None, None, lambda: False)
+        done = session.run(0, spp)
         spent = clock(session.device) - started
-        result = session.result(0, done)
+        result = make_result(session, 0, done)
         self.images.append(result.image)
         self.largest_weight = max(self.largest_weight, result.stats["largest_weight"])
         self.seconds.append(spent / (session.device.info.compute_units if session.device.is_cpu else 1))

@@ -14,6 +14,7 @@ from clvol.device.device import Device
 from clvol.picture.result import Result
 from clvol.planning.choices import Choices
 from clvol.planning.registry import FAMILIES
+from clvol.rendering.outcome import make_result
 from clvol.rendering.session import Session
 from clvol.scene.records import Scene
 
@@ -60,8 +61,8 @@ class Trial:
     def render(self, seed: int, spp: int) -> Result:
         """Samples 0 to spp of every pixel; ``stats["seconds"]["render"]`` is what they took."""
         self.session.restart(seed)
-        done = self.session.run(0, spp, None, None, lambda: False)
-        return self.session.result(0, done)
+        done = self.session.run(0, spp)
+        return make_result(self.session, 0, done)
 
 
 def rounds(trials: list[Trial], spp: list[int], seeds: Iterator[int]) -> Iterator[list[Result]]:

@@ -1,10 +1,10 @@
-"""A result as files: under the names it should have, and somewhere where that cannot be."""
+"""A picture as files: under the names it should have, and somewhere where that cannot be."""
 
 from __future__ import annotations
 
 import logging
 import secrets
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
 from clvol.base.output_files import (
     StrPath,
@@ -18,15 +18,10 @@ from clvol.base.output_files import (
 from clvol.errors import Error, OptionError
 from clvol.picture import image_io
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import numpy as np
-
-    from clvol.picture.result import Result
-
 log = logging.getLogger("clvol")
 SUFFIXES = (".exr", ".png")
+Encode = Callable[[str], bytes]
+"""The whole file of a picture, by the suffix of its name."""
 _SQUEEZED = 32
 """By how much compression may shrink a picture; noise hardly does by 2."""
 
@@ -52,17 +47,7 @@ def check_disk(path: StrPath, pixels: int, aovs: int) -> None:
         log.warning("%s: '%s' has no room for the %s it may take", path, folder, format_bytes(most))
 
 
-def encode(result: Result, suffix: str, exposure: float = 0.0) -> bytes:
-    """The whole file: a tone-mapped .png, or an .exr with picture, variance and every AOV."""
-    if suffix == ".png":
-        return image_io.encode_png(result.image, result.metadata, exposure)
-    channels: dict[str, np.ndarray] = {}
-    for name, image in [("", result.image), ("variance", result.variance), *result.aovs.items()]:
-        channels |= image_io.split_channels(name, image)
-    return image_io.encode_exr(channels, result.metadata | {"dof": result.dof})
-
-
-def save_all(result: Result, paths: Sequence[StrPath], exposure: float = 0.0) -> dict[StrPath, Error]:
+def save_all(encode: Encode, paths: Sequence[StrPath]) -> dict[StrPath, Error]:
     """Write every picture that can be written; return what went wrong with the others.
 
     The error also says where the picture is then: in another of the files, or in one with a name of its own.
@@ -72,21 +57,21 @@ def save_all(result: Result, paths: Sequence[StrPath], exposure: float = 0.0) ->
     for path in paths:
         try:
             suffix = output_suffix(path, SUFFIXES)
-            write_file(path, encode(result, suffix, exposure))
+            write_file(path, encode(suffix))
             whole = whole or (str(path) if suffix == ".exr" else "")
         except (Error, OSError, MemoryError) as error:
             failed[path] = getattr(error, "what", "") or str(error) or "out of memory"
     if not failed:
         return {}
-    whole = whole or _keep(result, next(iter(failed)))
+    whole = whole or _keep(encode, next(iter(failed)))
     hint = f"the picture is kept as {whole}" if whole else "and there is no other place to keep the picture"
     return {path: OptionError(what, str(path), hint) for path, what in failed.items()}
 
 
-def _keep(result: Result, path: StrPath) -> str:
+def _keep(encode: Encode, path: StrPath) -> str:
     """Where the picture is instead, as .exr; "" if there is no room for it anywhere."""
     try:
-        data = encode(result, ".exr")
+        data = encode(".exr")
     except (Error, OSError, MemoryError):
         return ""
     name = f"clvol-{secrets.token_hex(4)}.exr"

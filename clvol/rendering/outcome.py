@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from clvol.picture.estimate import Estimate
 from clvol.picture.result import Result, said_ranges
 from clvol.planning import registry
+from clvol.rendering.session import Session
 from clvol.scene.digest import scene_digest
 from clvol.tables.apart import extinction_ratio
 from clvol.version import __version__
-
-if TYPE_CHECKING:
-    from clvol.rendering.session import Session
 
 log = logging.getLogger("clvol")
 LARGE_WEIGHT = 100.0

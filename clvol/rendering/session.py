@@ -1,4 +1,4 @@
-"""One scene on one device with one set of choices: what `render` opens, runs and asks for its Result."""
+"""One scene on one device with one set of choices: what `render` opens and runs."""
 
 from __future__ import annotations
 
@@ -15,11 +15,10 @@ from clvol.base.progress import FilmNoise, Progress, ProgressCallback
 from clvol.device.device import Device
 from clvol.device.programs import build_stages
 from clvol.errors import RenderError
-from clvol.picture.result import Result, relative_noise
+from clvol.picture.result import relative_noise
 from clvol.planning import registry
 from clvol.planning.choices import Choices, prepare_for, resolve
 from clvol.planning.config import KernelConfig
-from clvol.rendering.outcome import make_result
 from clvol.rendering.upload import upload_scene
 from clvol.rendering.wavefront import Pool, Progressed, Wavefront
 from clvol.scene.records import Scene
@@ -168,9 +167,9 @@ class Session:
         self,
         first: int,
         count: int,
-        time_limit: float | None,
-        callback: ProgressCallback | None,
-        interrupted: Callable[[], int],
+        time_limit: float | None = None,
+        callback: ProgressCallback | None = None,
+        interrupted: Callable[[], int] = lambda: 0,
     ) -> int:
         """Render samples; returns how many of each pixel were done.
 
@@ -198,10 +197,6 @@ class Session:
     def _noise(self, first: int, count: int) -> float:
         estimate = self.wavefront.film.estimate(first, count)
         return relative_noise(*estimate.mean_and_variance(), estimate.dof)
-
-    def result(self, first: int, count: int) -> Result:
-        """The film as a Result, with what it cost."""
-        return make_result(self, first, count)
 
 
 def nothing_finished(urgency: int) -> BaseException:

@@ -124,7 +124,7 @@ def _nested(reader: Reader, most: int) -> list[tuple[str, Bsdf]]:
         reader.fail(f"'{reader.type}' has no BSDF in it", hint="nest the one that it is about")
     if len(found) > most:
         reader.fail(f"'{reader.type}' takes at most {most} BSDFs, got {len(found)}", found[most][0])
-    return [(name, reader.build.build(node)) for name, node in found]
+    return [(name, reader.build(node)) for name, node in found]
 
 
 def _specular(reader: Reader) -> tuple:

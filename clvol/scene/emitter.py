@@ -146,4 +146,4 @@ def _accept_common(reader: Reader) -> None:
         reader.fail("sampling_weight is 0: Mitsuba never samples such a light", "sampling_weight")
     medium = reader.only_child("medium")
     if medium is not None:
-        reader.build.build(medium)
+        reader.build(medium)

@@ -48,7 +48,7 @@ def moment(reader: Reader) -> Chosen:
     inner = reader.only_child("integrator")
     if inner is None:
         reader.fail("a moment integrator holds another one, this one is empty", hint="volpath, for instance")
-    return reader.build.build(inner)
+    return reader.build(inner)
 
 
 def _limits(reader: Reader, choices: dict[str, str]) -> Integrator:

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 from clvol.errors import SceneError, shown
 from clvol.scene import bsdf, emitter, integrator, medium, phase, sensor, shape, texture, volume
-from clvol.scene.builder import Builder, PluginTable
+from clvol.scene.library import Library, PluginTable
 from clvol.scene.mesh_files import FORMATS
 from clvol.scene.nodes import Node, from_dict
+from clvol.scene.reader import build
 from clvol.scene.records import ConstantEmitter, EnvmapEmitter, Integrator, Scene, Shape
 from clvol.scene.vocabulary import listed
 from clvol.scene.xml import read_xml
@@ -127,7 +128,7 @@ def load_dict(scene: Mapping[str, object]) -> Scene:
 def _build(root: Node, source: str) -> Scene:
     if root.type != "scene":
         raise SceneError(f"expected a scene, got a '{root.type}'", root.where)
-    builder = Builder(root, PLUGINS)
+    library = Library(root, PLUGINS)
     records: dict[str, list] = {kind: [] for kind in PLUGINS}
     seen: set[int] = set()
     for name, value in root.parameters():
@@ -135,14 +136,14 @@ def _build(root: Node, source: str) -> Scene:
             raise SceneError(
                 f"unknown parameter '{name}' of the scene", root.place(name), "it holds plugins only"
             )
-        node = builder.resolve(value)
+        node = library.resolve(value)
         if id(node) not in seen:
             seen.add(id(node))
-            records[builder.kind_of(node)].append((node, builder.build(node)))
+            records[library.kind_of(node)].append((node, build(node, library)))
     camera = _exactly_one_sensor(records["sensor"], root)
-    emitters = [pair for pair in records["emitter"] if not _is_inside(*pair, builder)]
+    emitters = [pair for pair in records["emitter"] if not _is_inside(*pair, library)]
     _check_emitters(emitters)
-    _check_used(records, builder)
+    _check_used(records, library)
     return Scene(
         sensor=camera.camera,
         film=camera.film,
@@ -163,19 +164,19 @@ def _exactly_one_sensor(sensors: list[tuple[Node, sensor.Sensor]], root: Node) -
     return sensors[0][1]
 
 
-def _is_inside(node: Node, record: object, builder: Builder) -> bool:
+def _is_inside(node: Node, record: object, library: Library) -> bool:
     """Whether it is an area light that stands in the scene so that shapes can refer to it, and one does."""
-    return isinstance(record, emitter.AreaLight) and id(node) in builder.taken
+    return isinstance(record, emitter.AreaLight) and id(node) in library.taken
 
 
-def _check_used(records: Mapping[str, list[tuple[Node, object]]], builder: Builder) -> None:
+def _check_used(records: Mapping[str, list[tuple[Node, object]]], library: Library) -> None:
     """What stands in the scene to be referred to must have an id, and should have a ref to it."""
     pairs = [pair for kind in records if kind not in IN_SCENES for pair in records[kind]]
-    idle = [node for node, _ in pairs if id(node) not in builder.taken]
+    idle = [node for node, _ in pairs if id(node) not in library.taken]
     for node in idle:
         if not node.id:
             raise SceneError(
-                f"the {builder.kind_of(node)} '{node.type}' stands in the scene and belongs to nothing",
+                f"the {library.kind_of(node)} '{node.type}' stands in the scene and belongs to nothing",
                 node.where,
                 "put it into the plugin that it is for, or give it an id and refer to it",
             )

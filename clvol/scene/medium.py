@@ -43,7 +43,7 @@ def _medium(reader: Reader, homogeneous: bool) -> Medium:
         sigma_t,
         albedo,
         scale,
-        reader.build.build(phase) if phase else Phase(),
+        reader.build(phase) if phase else Phase(),
         homogeneous,
         sample_emitters,
         **_emission(reader),
@@ -78,7 +78,7 @@ def _reduced(reader: Reader, volume: GridVolume) -> tuple[GridVolume, Spectrum]:
 
     One look-up then serves all.  What media share stays shared.
     """
-    done = reader.build.reduced
+    done = reader.library.reduced
     if id(volume.grid) not in done:
         done[id(volume.grid)] = proportional_channels(volume.grid)
     if done[id(volume.grid)] is None:
@@ -111,7 +111,7 @@ def _volume(reader: Reader, name: str, expected: str) -> Volume:
     found = reader.children("volume", name)
     if not found:
         reader.refuse_plugin(name, expected)
-    return reader.build.build(found[0][1])
+    return reader.build(found[0][1])
 
 
 def _emission(reader: Reader) -> dict[str, object]:

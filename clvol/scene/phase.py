@@ -46,7 +46,7 @@ def blendphase(reader: Reader) -> BlendPhase:
     if len(found) != 2:
         where = found[2][0] if len(found) > 2 else ""
         reader.fail(f"a blendphase takes two phase functions, got {len(found)}", where)
-    blend = BlendPhase(weight, *(reader.build.build(node) for _, node in found))
+    blend = BlendPhase(weight, *(reader.build(node) for _, node in found))
     if _leaves(blend) > MAX_LOBES:
         reader.fail(f"a mixture takes at most {MAX_LOBES} phase functions, got {_leaves(blend)}")
     return blend

@@ -1,20 +1,21 @@
 """Typed access to one node's parameters: reading a parameter is what declares it as supported.
 
-A builder asks for every parameter it knows and then calls `finish`, which refuses what is left over.
+A plugin's function asks for every parameter it knows; then `build`, which makes the record of each node once,
+refuses what is left over.
 """
 
 from __future__ import annotations
 
 import logging
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
 from clvol.base.masks import as_array, masked_count
 from clvol.errors import SceneError, shown
 from clvol.scene import spectra
-from clvol.scene.nodes import NAMELESS, Node
+from clvol.scene.nodes import MAX_DEPTH, NAMELESS, Node
 from clvol.scene.transforms import as_matrix
 from clvol.scene.vocabulary import did_you_mean, join_hints, listed
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from clvol.scene.builder import Builder
+    from clvol.scene.library import Library
     from clvol.scene.records import Spectrum
 
 log = logging.getLogger("clvol")
@@ -43,15 +44,15 @@ _PLAIN_NAMES = {bool: "true or false", int: "an integer", float: "a number", str
 
 
 class Reader:
-    """The parameters of `node`, converted and checked as a builder asks for them.
+    """The parameters of `node`, converted and checked as its plugin asks for them.
 
     All methods raise `SceneError` with the parameter's place when its value does not fit.
     """
 
-    def __init__(self, node: Node, build: Builder) -> None:
-        self.node, self.build = node, build
+    def __init__(self, node: Node, library: Library) -> None:
+        self.node, self.library = node, library
         self.type = node.type
-        self.kind = build.kind_of(node)
+        self.kind = library.kind_of(node)
         self._asked: list[str] = []
         self._used: set[str] = set()
 
@@ -248,10 +249,10 @@ class Reader:
         found = []
         for key, value in self.node.parameters():
             if isinstance(value, Node) and not value.is_value and name in ("", key):
-                target = self.build.resolve(value)
-                if self.build.kind_of(target) == kind:
+                target = self.library.resolve(value)
+                if self.library.kind_of(target) == kind:
                     self._used.add(key)
-                    self.build.taken.add(id(target))
+                    self.library.taken.add(id(target))
                     found.append((key, target))
         return found
 
@@ -261,6 +262,10 @@ class Reader:
         if len(found) > 1:
             self.fail(f"{self.kind} '{self.type}' takes one {kind}, got {len(found)}", found[1][0])
         return found[0][1] if found else None
+
+    def build(self, node: Node) -> Any:
+        """The record of a plugin inside; see `build`."""
+        return build(node, self.library)
 
     # -- the rest ----------------------------------------------------------------------------------
 
@@ -279,11 +284,11 @@ class Reader:
 
     def refuse_plugin(self, name: str, expected: str = "") -> NoReturn:
         """Raise for the plugin in parameter `name`: not supported at all, or not here."""
-        inner = self.build.resolve(self.node[name])
-        self.build.check_supported(inner)
+        inner = self.library.resolve(self.node[name])
+        self.library.check_supported(inner)
         if expected:
             self._wrong(name, expected, inner)
-        self.fail(f"{self.kind} '{self.type}' takes no {self.build.kind_of(inner)} ('{inner.type}')", name)
+        self.fail(f"{self.kind} '{self.type}' takes no {self.library.kind_of(inner)} ('{inner.type}')", name)
 
     def finish(self) -> None:
         """Raise for the first parameter or inner plugin that nobody asked for."""
@@ -293,11 +298,26 @@ class Reader:
             if name in self._asked:
                 self.fail(f"'{name}' of {self.kind} '{self.type}' has no effect here", name, "leave it out")
             if isinstance(value, Node) and not value.is_value:
-                inner = self.build.resolve(value)
-                if self.build.kind_of(inner) not in BY_NAME or name.startswith(NAMELESS):
+                inner = self.library.resolve(value)
+                if self.library.kind_of(inner) not in BY_NAME or name.startswith(NAMELESS):
                     self.refuse_plugin(name)
             hint = join_hints(did_you_mean(name, self._asked), f"supported: {listed(self._asked)}")
             self.fail(f"unknown parameter '{name}' of {self.kind} '{self.type}'", name, hint)
+
+
+def build(node: Node, library: Library) -> Any:
+    """The record of a node; the same object each time, so that what is shared stays shared."""
+    if id(node) not in library.built:
+        library.check_supported(node)
+        if any(node is outer for outer in library.open) or len(library.open) > MAX_DEPTH:
+            raise SceneError(f"'{node.type}' is nested without end", node.where)
+        library.open.append(node)
+        reader = Reader(node, library)
+        record = library.plugins[reader.kind][node.type](reader)
+        reader.finish()
+        library.open.pop()
+        library.built[id(node)] = record
+    return library.built[id(node)]
 
 
 def _float(value: Real) -> float:

@@ -71,9 +71,9 @@ def _sensor(reader: Reader, camera: Perspective) -> Sensor:
     film_node, sampler_node = reader.only_child("film"), reader.only_child("sampler")
     medium = reader.only_child("medium")
     return Sensor(
-        replace(camera, medium=reader.build.build(medium) if medium else None),
-        reader.build.build(film_node) if film_node else Film(),
-        reader.build.build(sampler_node) if sampler_node else Sampler(),
+        replace(camera, medium=reader.build(medium) if medium else None),
+        reader.build(film_node) if film_node else Film(),
+        reader.build(sampler_node) if sampler_node else Sampler(),
     )
 
 
@@ -126,7 +126,7 @@ def hdrfilm(reader: Reader) -> Film:
     return Film(
         width,
         height,
-        reader.build.build(rfilter) if rfilter else ReconstructionFilter(),
+        reader.build(rfilter) if rfilter else ReconstructionFilter(),
         reader.boolean("sample_border", False),
         _crop(reader, width, height),
     )

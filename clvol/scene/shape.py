@@ -129,7 +129,7 @@ def _shape(reader: Reader, kind: str, to_world: np.ndarray, triangles: Mesh | No
         to_world,
         interior=media.get("interior"),
         exterior=media.get("exterior"),
-        bsdf=reader.build.build(bsdf) if bsdf else Diffuse((0.0,) if emission else (0.5,)),
+        bsdf=reader.build(bsdf) if bsdf else Diffuse((0.0,) if emission else (0.5,)),
         emission=emission,
         flip_normals=reader.boolean("flip_normals", False),
         mesh=triangles,
@@ -148,7 +148,7 @@ def _emission(reader: Reader) -> tuple[float, ...] | None:
     node = reader.only_child("emitter")
     if node is None:
         return None
-    light = reader.build.build(node)
+    light = reader.build(node)
     if not isinstance(light, AreaLight):
         name = next(name for name, _ in reader.children("emitter"))
         reader.fail(f"a shape takes no emitter '{node.type}'", name, "area emitters go into shapes")
@@ -161,5 +161,5 @@ def _media(reader: Reader) -> dict[str, Medium]:
     for name, medium in reader.children("medium"):
         if name not in ("interior", "exterior"):
             reader.fail(f"the medium '{name}' of a shape must be its 'interior' or 'exterior'", name)
-        media[name] = reader.build.build(medium)
+        media[name] = reader.build(medium)
     return media

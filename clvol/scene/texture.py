@@ -71,7 +71,7 @@ def texture(reader: Reader, name: str, default: float) -> Texture:
     found = reader.children("texture", name)
     if not found:
         reader.refuse_plugin(name, "a number, an rgb, a spectrum or a texture")
-    return reader.build.build(found[0][1])
+    return reader.build(found[0][1])
 
 
 def constant(reader: Reader, name: str, default: float, minimum: float) -> float:

@@ -35,7 +35,7 @@ def vdbvolume(reader: Reader) -> Volume:
         reader.fail("a vdbvolume needs a filename")
     path = find_parameter(reader, "filename")
     name = reader.string("grid", "density")
-    grids = reader.build.grids
+    grids = reader.library.grids
     key = (path.resolve(), name)
     if key not in grids:
         grids[key] = read_vdb(path, name)
@@ -97,7 +97,7 @@ def _grid(reader: Reader) -> Grid:
             reader.fail(f"an array has no grid named '{name}'", "grid", "the name goes with a filename")
         return dense_from_array(reader.array(sources[0]), source=reader.node.place(sources[0]))
     path = find_parameter(reader, "filename")
-    grids = reader.build.grids
+    grids = reader.library.grids
     if name is None and path.suffix.lower() == ".vdb":
         name = "density"
     key = (path.resolve(), name)

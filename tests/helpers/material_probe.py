@@ -6,8 +6,9 @@ import pyopencl as cl
 from clvol import layout
 from clvol.device import programs
 from clvol.scene import bsdf, texture
-from clvol.scene.builder import Builder
+from clvol.scene.library import Library
 from clvol.scene.nodes import from_dict
+from clvol.scene.reader import build
 from clvol.tables.materials import BSDF_HEADERS, material_table
 
 PLUGINS = {
@@ -77,8 +78,7 @@ __kernel void texture_probe(SCENE, __global const int *number, __global const fl
 def read(description):
     """The record of a BSDF or texture that is described in Mitsuba's words."""
     root = from_dict({"type": "scene", "it": description})
-    builder = Builder(root, PLUGINS)
-    return builder.build(root["it"])
+    return build(root["it"], Library(root, PLUGINS))
 
 
 def source(kinds, channel=None, textures=True):

@@ -15,9 +15,10 @@ from scipy import stats
 from stat_tests import FALSE_ALARM, sidak
 
 import clvol
-from clvol.lab.comparison.figures import LEVEL, Comparison, Figures, compute_figures
+from clvol.lab.comparison.figures import LEVEL, Figures, compute_figures
 from clvol.lab.comparison.measure import Measured
 from clvol.lab.comparison.reference import Reference
+from clvol.lab.comparison.result import Comparison
 from clvol.lab.comparison.shorter import render_slope
 from clvol.lab.efficiency import Interval, error_products, fitted_slope
 from clvol.lab.trials import Trial

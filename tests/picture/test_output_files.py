@@ -26,7 +26,7 @@ from clvol.lab.ray.view import check_output
 from clvol.picture import image_io
 from clvol.picture.estimate import Moments
 from clvol.picture.result import Result
-from clvol.picture.saving import check_disk, encode
+from clvol.picture.saving import check_disk
 
 SCENE = """<scene version="3.0.0"><sensor type="perspective"><film type="hdrfilm">
 <integer name="width" value="64"/><integer name="height" value="64"/></film></sensor>
@@ -118,12 +118,12 @@ def test_no_picture_is_cut_short(tmp_path: Path, name: str, limit: int) -> None:
 
 @pytest.mark.parametrize("suffix", [".png", ".exr"])
 def test_wherever_memory_ends_no_file_is_taken_for_whole(suffix: str) -> None:
-    whole = len(encode(noise(16), suffix))
+    whole = len(noise(16).encode(suffix))
     for limit in [*range(1, whole - 40, 997), *range(whole - 40, whole)]:
         with no_file_over(limit), pytest.raises(OptionError, match="cannot make the"):
-            encode(noise(16), suffix)
+            noise(16).encode(suffix)
     with no_file_over(whole):
-        assert len(encode(noise(16), suffix)) == whole
+        assert len(noise(16).encode(suffix)) == whole
 
 
 @pytest.mark.parametrize("name", ["a.png", "a.exr"])

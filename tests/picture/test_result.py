@@ -12,7 +12,8 @@ import pytest
 from clvol.errors import OptionError
 from clvol.picture import image_io
 from clvol.picture.estimate import Moments
-from clvol.picture.result import Result, merge, relative_noise
+from clvol.picture.merging import merge
+from clvol.picture.result import Result, relative_noise
 
 HEIGHT, WIDTH = 5, 7
 

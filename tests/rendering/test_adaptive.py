@@ -35,6 +35,7 @@ from clvol.rendering.adaptive import (
     optimum,
     powers_of_two,
 )
+from clvol.rendering.outcome import make_result
 from clvol.rendering.session import Session, seed_words
 from clvol.scene.records import ConstantEmitter
 
@@ -195,7 +196,7 @@ def in_lists(session, seed, samples):
         wavefront.list_pixels(pixels)
         film.samples[pixels] += wavefront.run(0, count, lambda: False, lambda _: None)
     session.seconds = 1.0
-    return session.result(0, samples)
+    return make_result(session, 0, samples)
 
 
 CASES = {
@@ -238,7 +239,7 @@ def test_only_the_pilot_decides_how_many_samples_a_pixel_gets(half):
         render = started(half, seed, 0.05)
         render.pilot.clear(seed_words(pilot_seed))
         render.run(None, None, lambda: False)
-        return render.picture.samples, half.result(0, 1).image
+        return render.picture.samples, make_result(half, 0, 1).image
 
     samples, image = counts(1, 2)
     assert samples.min() == LEAST < samples.max()
@@ -249,7 +250,7 @@ def test_only_the_pilot_decides_how_many_samples_a_pixel_gets(half):
 
 
 def test_the_same_seed_gives_the_same_bits_twice(half):
-    first, again = (finished(half, 6, 0.05) and half.result(0, 1) for _ in range(2))
+    first, again = (finished(half, 6, 0.05) and make_result(half, 0, 1) for _ in range(2))
     assert np.array_equal(first.image, again.image)
     assert np.array_equal(first.aovs["samples"], again.aovs["samples"])
 
@@ -316,7 +317,7 @@ def test_the_noise_is_the_target(request, which, target, least):
     pictures, told = [], []
     for seed in range(20):
         finished(session, seed, target)
-        result = session.result(0, 1)
+        result = make_result(session, 0, 1)
         pictures.append(result.image[..., 0].astype(float))
         told.append(result.noise)
     noise, error = true_noise(np.array(pictures))
@@ -373,7 +374,7 @@ def test_a_time_limit_leaves_a_whole_picture(half, monkeypatch, ticks):
     counts = render.picture.samples
     assert counts.min() >= 1
     assert render.pilot.samples.max() <= max(LEAST, counts.mean() / 2)
-    result = half.result(0, round(counts.mean()))
+    result = make_result(half, 0, round(counts.mean()))
     assert np.isfinite(result.image).all()
     assert result.image[:, :4] == pytest.approx(1.0)
 

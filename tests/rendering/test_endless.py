@@ -16,6 +16,7 @@ from stat_tests import assert_same_picture
 import clvol
 from clvol.planning.choices import Choices
 from clvol.rendering import wavefront
+from clvol.rendering.outcome import make_result
 from clvol.rendering.session import Session
 
 WALK_STEPS, STAGE_STEPS = 1 << 12, 1 << 13
@@ -178,10 +179,10 @@ def test_a_second_interrupt_keeps_finished_passes_and_leaves_nothing_behind(devi
 
     done = session.run(0, 1 << 20, None, finished.append, ask)
     assert done == finished[-1].samples_done > 0
-    cut = session.result(0, done)
+    cut = make_result(session, 0, done)
     session.restart(1)
-    assert session.run(0, done, None, None, lambda: 0) == done
-    assert digest(session.result(0, done)) == digest(cut)
+    assert session.run(0, done) == done
+    assert digest(make_result(session, 0, done)) == digest(cut)
 
 
 def test_a_time_limit_ends_paths_without_end(monkeypatch):

@@ -153,7 +153,7 @@ def test_the_table_has_every_parameter_that_the_reader_asks_for(name, monkeypatc
                 kinds.add(kind)
             return super().children(kind, key)
 
-    monkeypatch.setattr("clvol.scene.builder.Reader", Watched)
+    monkeypatch.setattr("clvol.scene.reader.Reader", Watched)
     given = {name: {"type": name} | PARAMETERS[name][0]}
     for other, parameter, needs, value in CASES:
         if other == name:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -121,53 +119,6 @@ class Figures:
     def image(self) -> np.ndarray:
         """Mean of all rounds, float64 (height, width, 3)."""
         return self.measured.images.mean(axis=0, dtype=np.float64)
-
-
-@dataclass(frozen=True, eq=False)
-class Comparison:
-    """Combinations compared on one scene.
-
-    Parameters
-    ----------
-    figures : of each combination, in the order asked for.
-    baseline : label of the one that efficiencies are relative to.
-    left_out : (asked for, why it cannot be); doubles : (asked for, label that it comes to).
-    interrupted : whether Ctrl-C ended it early.
-    about : how it was made.
-    """
-
-    figures: tuple[Figures, ...]
-    baseline: str
-    reference: Reference
-    left_out: tuple[tuple[str, str], ...] = ()
-    doubles: tuple[tuple[str, str], ...] = ()
-    interrupted: bool = False
-    about: dict[str, Any] = field(default_factory=dict)
-
-    def __getitem__(self, label: str) -> Figures:
-        """The figures of one combination."""
-        return {f.label: f for f in self.figures}[label]
-
-    @property
-    def words(self) -> tuple[str, ...]:
-        """What was found, in sentences."""
-        from clvol.lab.comparison.words import sentences
-
-        return tuple(sentence.text for sentence in sentences(self))
-
-    def save(self, folder: str | os.PathLike[str]) -> None:
-        """Write the report: report.json, report.html and plots as PNG; completely or not at all.
-
-        OptionError for a folder that holds anything but an earlier report, or cannot be written.
-        """
-        from clvol.lab.comparison.report import write_report
-
-        write_report(self, folder)
-
-    def __repr__(self) -> str:
-        from clvol.lab.comparison.words import text_table
-
-        return text_table(self)
 
 
 def compute_figures(measured: list[Measured], reference: Reference, baseline: str) -> tuple[Figures, ...]:

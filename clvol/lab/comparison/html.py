@@ -6,7 +6,8 @@ import base64
 from html import escape
 from pathlib import PurePath
 
-from clvol.lab.comparison.figures import ALPHA, DARK, Comparison
+from clvol.lab.comparison.figures import ALPHA, DARK
+from clvol.lab.comparison.findings import Findings
 from clvol.lab.comparison.plots import error_pictures, error_scales, picture
 from clvol.lab.comparison.words import sentences, table_rows
 
@@ -53,21 +54,21 @@ CAPTIONS = {
 }
 
 
-def html_report(comparison: Comparison, drawn: dict[str, bytes]) -> str:
+def html_report(findings: Findings, drawn: dict[str, bytes]) -> str:
     """The page; `drawn` are the plots of `plots.plots`."""
-    name = PurePath(str(comparison.about.get("scene", ""))).name or "scene"
+    name = PurePath(str(findings.about.get("scene", ""))).name or "scene"
     parts = [
         f"<h1>{escape(name)}: speed against error</h1>",
-        f'<p class="lead">{_lead(comparison)}</p>',
+        f'<p class="lead">{_lead(findings)}</p>',
         "<h2>What was found</h2>",
-        _words(comparison),
-        _summary(comparison),
+        _words(findings),
+        _summary(findings),
         "<h2>Error over cost</h2>",
         _plots(drawn),
         "<h2>Pictures</h2>",
-        _pictures(comparison),
+        _pictures(findings),
         "<h2>How it was made</h2>",
-        _made(comparison),
+        _made(findings),
     ]
     head = f'<meta charset="utf-8"><title>{escape(name)}: clvol compare</title>'
     view = '<meta name="viewport" content="width=device-width, initial-scale=1">'
@@ -78,20 +79,20 @@ def html_report(comparison: Comparison, drawn: dict[str, bytes]) -> str:
     )
 
 
-def _lead(comparison: Comparison) -> str:
-    about, count = comparison.about, len(comparison.figures)
+def _lead(findings: Findings) -> str:
+    about, count = findings.about, len(findings.figures)
     what = "combination" if count == 1 else "combinations"
     size = f"{about.get('width', '?')} × {about.get('height', '?')} pixels"
     return escape(
         f"{count} {what}, {about.get('rounds', '?')} independent rounds of each by turns, {size}; "
-        f"baseline {comparison.baseline}; reference {comparison.reference.source}."
+        f"baseline {findings.baseline}; reference {findings.reference.source}."
     )
 
 
-def _words(comparison: Comparison) -> str:
-    alarms = {f.label for f in comparison.figures if not f.verdict.agrees}
+def _words(findings: Findings) -> str:
+    alarms = {f.label for f in findings.figures if not f.verdict.agrees}
     items = []
-    for sentence in sentences(comparison):
+    for sentence in sentences(findings):
         alarm = sentence.kind == "verdict" and any(
             sentence.text.startswith(f"{label} {verb}")
             for label in alarms
@@ -107,14 +108,14 @@ def _table(heads: list[str], rows: list[list[str]], kind: str = "") -> str:
     return f'<div class="scroll"><table class="{kind}"><tr>{head}</tr>{body}</table></div>'
 
 
-def _summary(comparison: Comparison) -> str:
+def _summary(findings: Findings) -> str:
     note = (
         f"Relative RMSE and largest error: of the mean of all rounds; relative to F² + ({DARK:g} · mean F)², "
         "F being the reference, whose own variance is subtracted. Efficiency: times the baseline's, with its "
         "95 % interval, for renders of as many samples as the table says (sampler sobol gains with their "
         f"number); * significantly different. Verdicts raise a false alarm with probability {ALPHA:g}."
     )
-    return _table(*table_rows(comparison)) + f'<p class="note">{escape(note)}</p>'
+    return _table(*table_rows(findings)) + f'<p class="note">{escape(note)}</p>'
 
 
 def _plots(drawn: dict[str, bytes]) -> str:
@@ -137,11 +138,11 @@ def _img(png: bytes, alt: str) -> str:
     return f'<img alt="{alt}" src="data:image/png;base64,{data}">'
 
 
-def _pictures(comparison: Comparison) -> str:
-    scales = error_scales(comparison)
-    rows: list[list[tuple[str, bytes]]] = [[("reference", picture(comparison.reference.image))], [], []]
-    for f in comparison.figures:
-        shown = [picture(f.image), *error_pictures(f, comparison, scales)]
+def _pictures(findings: Findings) -> str:
+    scales = error_scales(findings)
+    rows: list[list[tuple[str, bytes]]] = [[("reference", picture(findings.reference.image))], [], []]
+    for f in findings.figures:
+        shown = [picture(f.image), *error_pictures(f, findings, scales)]
         for row, png in zip(rows, shown, strict=True):
             row.append((f.label + (" (biased)" if f.biased else ""), png))
     titles = (
@@ -166,10 +167,10 @@ def _scale(kind: str, low: str, high: str) -> str:
     return f'<div class="bar {kind}"></div><div class="ends"><span>{low}</span><span>{high}</span></div>'
 
 
-def _made(comparison: Comparison) -> str:
-    facts = [[k.replace("_", " "), str(v)] for k, v in comparison.about.items() if v is not None]
+def _made(findings: Findings) -> str:
+    facts = [[k.replace("_", " "), str(v)] for k, v in findings.about.items() if v is not None]
     rows = []
-    for f in comparison.figures:
+    for f in findings.figures:
         m = f.measured
         spp = f"{m.spp} spp × {len(m.seeds)}"
         seconds = f"{m.trial.precompute_seconds:.2f} + {m.seconds.sum():.2f}"

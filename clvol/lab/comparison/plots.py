@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clvol.lab.comparison.figures import COSTS, Comparison, Figures
+from clvol.lab.colours import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
+from clvol.lab.comparison.figures import COSTS, Figures, relative_weight
+from clvol.lab.comparison.findings import Findings
 from clvol.picture.image_io import MAGENTA, tone_map
 
 if TYPE_CHECKING:
@@ -16,8 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#7a5195", "#555555")
-"""Okabe and Ito's, which colour-blind readers tell apart too."""
+COLOURS = (BLUE, VERMILION, GREEN, PURPLE, SKY, ORANGE, "#7a5195", "#555555")
 DASHES = ("-", "--", "-.", ":")
 STYLE = {
     "font.family": "DejaVu Sans",
@@ -34,23 +35,23 @@ STYLE = {
 UNITS = {"seconds": "seconds", "lookups": "density look-ups"}
 
 
-def plots(comparison: Comparison) -> dict[str, bytes]:
+def plots(findings: Findings) -> dict[str, bytes]:
     """PNG by name: error over each kind of cost, efficiency; those that can be drawn."""
     import matplotlib
     from matplotlib.figure import Figure
 
     drawn = {}
     with matplotlib.rc_context(STYLE):
-        costs = [cost for cost in COSTS if any(getattr(f, cost)[-1] > 0 for f in comparison.figures)]
+        costs = [cost for cost in COSTS if any(getattr(f, cost)[-1] > 0 for f in findings.figures)]
         for cost in costs:
             for name, label in (("relmse", "relative MSE"), ("rmse", "RMSE")):
                 figure = Figure(figsize=(5.6, 4.4), layout="constrained")
-                _errors(figure.add_subplot(), comparison, name, cost)
+                _errors(figure.add_subplot(), findings, name, cost)
                 figure.axes[0].set(xlabel=UNITS[cost], ylabel=label)
                 drawn[f"{name}_over_{cost}"] = _png(figure)
-        if len(comparison.figures) > 1:
-            figure = Figure(figsize=(9.2, 1.3 + 0.34 * len(comparison.figures)), layout="constrained")
-            _efficiencies(figure, comparison)
+        if len(findings.figures) > 1:
+            figure = Figure(figsize=(9.2, 1.3 + 0.34 * len(findings.figures)), layout="constrained")
+            _efficiencies(figure, findings)
             drawn["efficiency"] = _png(figure)
     return drawn
 
@@ -62,11 +63,11 @@ def _look(number: int) -> dict[str, Any]:
     }
 
 
-def _errors(axes: Axes, comparison: Comparison, name: str, cost: str) -> None:
+def _errors(axes: Axes, findings: Findings, name: str, cost: str) -> None:
     """One error over one cost, log-log, with bands and a guide of the slope that noise has."""
     power = 0.5 if name == "rmse" else 1.0
     starts = []
-    for number, figures in enumerate(comparison.figures):
+    for number, figures in enumerate(findings.figures):
         curve = figures.mse if name == "rmse" else figures.relmse
         spent, value = getattr(figures, cost), np.maximum(curve.value, 0.0) ** power
         shown = (value > 0) & (spent > 0)
@@ -96,14 +97,14 @@ def _guide(axes: Axes, starts: list[tuple[float, float, float]], power: float) -
     axes.plot([begin, end], values, color="#999999", lw=1, ls=(0, (4, 3)), label=f"slope {slope}", zorder=1)
 
 
-def _efficiencies(figure: Figure, comparison: Comparison) -> None:
+def _efficiencies(figure: Figure, findings: Findings) -> None:
     """Ratios with their intervals; filled where they are significant."""
     panels = figure.subplots(1, len(COSTS), sharey=True)
-    places = np.arange(len(comparison.figures))[::-1]
+    places = np.arange(len(findings.figures))[::-1]
     for axes, (cost, word) in zip(panels, COSTS.items(), strict=True):
         axes.axvline(1.0, color="#999999", lw=1, ls=(0, (4, 3)))
         ends = [1.0]
-        for place, (number, figures) in zip(places, enumerate(comparison.figures), strict=True):
+        for place, (number, figures) in zip(places, enumerate(findings.figures), strict=True):
             e = figures.efficiency.get(cost)
             if e is None or not 0 < e.ratio.value < math.inf:
                 axes.text(
@@ -115,14 +116,14 @@ def _efficiencies(figure: Figure, comparison: Comparison) -> None:
             axes.plot(
                 [e.ratio.low, e.ratio.high], [place, place], color=colour, lw=2.5, solid_capstyle="round"
             )
-            filled = colour if e.significant or figures.label == comparison.baseline else "white"
+            filled = colour if e.significant or figures.label == findings.baseline else "white"
             axes.plot(e.ratio.value, place, "o", ms=7, mec=colour, mfc=filled, mew=1.8)
-        axes.set(xscale="log", xlabel=f"efficiency by {word}, relative to {comparison.baseline}")
+        axes.set(xscale="log", xlabel=f"efficiency by {word}, relative to {findings.baseline}")
         finite = [end for end in ends if 0 < end < math.inf]
         axes.set_xlim(min(finite) / 1.3, max(finite) * 1.3)
         _plain_ticks(axes.xaxis)
         axes.grid(False, axis="y")
-    panels[0].set_yticks(places, [f.label for f in comparison.figures])
+    panels[0].set_yticks(places, [f.label for f in findings.figures])
     panels[0].set_ylim(-0.6, len(places) - 0.4)
 
 
@@ -157,40 +158,38 @@ def picture(image: np.ndarray) -> bytes:
     return _pixels(pixels)
 
 
-def error_scales(comparison: Comparison) -> tuple[float, float]:
+def error_scales(findings: Findings) -> tuple[float, float]:
     """What the error images of all combinations end at: of a round's relative RMS error, and of the relative
     difference of the mean."""
-    spreads = [np.quantile(_spread(f, comparison), 0.99) for f in comparison.figures]
-    differences = [np.quantile(np.abs(_difference(f, comparison)), 0.99) for f in comparison.figures]
+    spreads = [np.quantile(_spread(f, findings), 0.99) for f in findings.figures]
+    differences = [np.quantile(np.abs(_difference(f, findings)), 0.99) for f in findings.figures]
     return max(float(max(spreads)), 1e-12), max(float(max(differences)), 1e-12)
 
 
-def error_pictures(figures: Figures, comparison: Comparison, scales: tuple[float, float]) -> list[bytes]:
+def error_pictures(figures: Figures, findings: Findings, scales: tuple[float, float]) -> list[bytes]:
     """Where a round is noisy, and where the mean of all rounds is too bright (red) or too dark (blue)."""
     import matplotlib
 
-    spread = np.clip(_spread(figures, comparison) / scales[0], 0, 1)
-    difference = np.clip(_difference(figures, comparison) / scales[1], -1, 1)
+    spread = np.clip(_spread(figures, findings) / scales[0], 0, 1)
+    difference = np.clip(_difference(figures, findings) / scales[1], -1, 1)
     noisy = matplotlib.colormaps["magma"](spread)
     signed = matplotlib.colormaps["RdBu_r"](difference / 2 + 0.5)
     return [_pixels(np.rint(255 * colours[..., :3]).astype(np.uint8)) for colours in (noisy, signed)]
 
 
-def _level(comparison: Comparison) -> np.ndarray:
+def _level(findings: Findings) -> np.ndarray:
     """What errors are relative to, (height, width): sqrt(F² + (DARK · mean F)²)."""
-    from clvol.lab.comparison.figures import relative_weight
-
-    return 1.0 / np.sqrt(relative_weight(comparison.reference.image.mean(axis=-1)))
+    return 1.0 / np.sqrt(relative_weight(findings.reference.image.mean(axis=-1)))
 
 
-def _spread(figures: Figures, comparison: Comparison) -> np.ndarray:
-    images, truth = figures.measured.images, comparison.reference
+def _spread(figures: Figures, findings: Findings) -> np.ndarray:
+    images, truth = figures.measured.images, findings.reference
     squares = sum((image - truth.image) ** 2 for image in images) / len(images) - truth.variance
-    return np.sqrt(np.maximum(squares, 0.0).mean(axis=-1)) / _level(comparison)
+    return np.sqrt(np.maximum(squares, 0.0).mean(axis=-1)) / _level(findings)
 
 
-def _difference(figures: Figures, comparison: Comparison) -> np.ndarray:
-    return (figures.image - comparison.reference.image).mean(axis=-1) / _level(comparison)
+def _difference(figures: Figures, findings: Findings) -> np.ndarray:
+    return (figures.image - findings.reference.image).mean(axis=-1) / _level(findings)
 
 
 def _pixels(pixels: np.ndarray) -> bytes:

@@ -34,7 +34,8 @@ import numpy as np
 from clvol.base.extras import need_matplotlib
 from clvol.base.output_files import check_room, kept_elsewhere, new_file, real, sync_folder
 from clvol.errors import OptionError
-from clvol.lab.comparison.figures import Comparison, Curve, Figures
+from clvol.lab.comparison.figures import Curve, Figures
+from clvol.lab.comparison.findings import Findings
 from clvol.lab.comparison.html import html_report
 from clvol.lab.comparison.plots import plots
 from clvol.lab.comparison.words import sentences
@@ -63,18 +64,18 @@ def check_folder(folder: str | os.PathLike[str]) -> None:
     check_room(target.parent, where, _LEAST_BYTES)
 
 
-def write_report(comparison: Comparison, folder: str | os.PathLike[str]) -> None:
+def write_report(findings: Findings, folder: str | os.PathLike[str]) -> None:
     """Write the folder; an earlier report of that name is replaced once the new one is complete.
 
     OptionError as `check_folder` says, and as `write_or_keep`.
     """
     check_folder(folder)
-    write_or_keep(comparison, folder)
+    write_or_keep(findings, folder)
 
 
-def write_or_keep(comparison: Comparison, folder: str | os.PathLike[str]) -> None:
+def write_or_keep(findings: Findings, folder: str | os.PathLike[str]) -> None:
     """Write the folder, or, where that fails, as on a full disk, another one; OptionError then says which."""
-    files = _files(comparison)
+    files = _files(findings)
     try:
         check_folder(folder)
         _replace(real(folder), files)
@@ -126,42 +127,42 @@ def _own_files(folder: Path) -> set[str]:
         return set()
 
 
-def _files(comparison: Comparison) -> dict[str, bytes]:
+def _files(findings: Findings) -> dict[str, bytes]:
     """What is in the folder, by name."""
-    drawn = plots(comparison)
+    drawn = plots(findings)
     files = {f"{name}.png": png for name, png in drawn.items()}
-    files[_HTML] = html_report(comparison, drawn).encode("utf-8", "backslashreplace")
-    reference = comparison.reference
+    files[_HTML] = html_report(findings, drawn).encode("utf-8", "backslashreplace")
+    reference = findings.reference
     channels = image_io.split_channels("", reference.image)
     if reference.variance_known:
         channels |= image_io.split_channels("variance", reference.variance)
-    files[_REFERENCE] = image_io.encode_exr(channels, _reference_metadata(comparison))
-    text = json.dumps(as_json(comparison) | {"files": sorted(files)}, indent=1, allow_nan=False)
+    files[_REFERENCE] = image_io.encode_exr(channels, _reference_metadata(findings))
+    text = json.dumps(as_json(findings) | {"files": sorted(files)}, indent=1, allow_nan=False)
     return files | {_JSON: (text + "\n").encode()}
 
 
-def _reference_metadata(comparison: Comparison) -> dict[str, Any]:
-    about = comparison.about
+def _reference_metadata(findings: Findings) -> dict[str, Any]:
+    about = findings.about
     known = {"scene": about.get("scene"), "digest": about.get("digest"), "version": about.get("clvol")}
-    known |= {"spp": comparison.reference.spp, "dof": len(comparison.reference.rounds) - 1}
-    known |= {"reference": comparison.reference.source}
-    if comparison.reference.seeds is not None:
-        known["seeds"] = "{} {}".format(*comparison.reference.seeds)
+    known |= {"spp": findings.reference.spp, "dof": len(findings.reference.rounds) - 1}
+    known |= {"reference": findings.reference.source}
+    if findings.reference.seeds is not None:
+        known["seeds"] = "{} {}".format(*findings.reference.seeds)
     return {name: value for name, value in known.items() if value is not None}
 
 
-def as_json(comparison: Comparison) -> dict[str, Any]:
+def as_json(findings: Findings) -> dict[str, Any]:
     """Everything in report.json but the names of files; what is not finite is None."""
-    reference = comparison.reference
+    reference = findings.reference
     return _plain(
         {
             "kind": KIND,
-            "made": comparison.about,
-            "baseline": comparison.baseline,
-            "interrupted": comparison.interrupted,
-            "left_out": [{"asked": said, "reason": why} for said, why in comparison.left_out],
-            "doubles": [{"asked": said, "same_as": label} for said, label in comparison.doubles],
-            "words": [dataclasses.asdict(sentence) for sentence in sentences(comparison)],
+            "made": findings.about,
+            "baseline": findings.baseline,
+            "interrupted": findings.interrupted,
+            "left_out": [{"asked": said, "reason": why} for said, why in findings.left_out],
+            "doubles": [{"asked": said, "same_as": label} for said, label in findings.doubles],
+            "words": [dataclasses.asdict(sentence) for sentence in sentences(findings)],
             "reference": {
                 "source": reference.source,
                 "spp": reference.spp,
@@ -169,7 +170,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
                 "mean": float(reference.image.mean()),
                 "rms_error": float(np.sqrt(reference.variance.mean())),
             },
-            "combinations": [_combination(f) for f in comparison.figures],
+            "combinations": [_combination(f) for f in findings.figures],
         }
     )
 

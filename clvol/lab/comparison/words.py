@@ -11,7 +11,8 @@ import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from clvol.lab.comparison.figures import ALPHA, COSTS, LEVEL, Comparison, Efficiency, Figures
+from clvol.lab.comparison.figures import ALPHA, COSTS, LEVEL, Efficiency, Figures
+from clvol.lab.comparison.findings import Findings
 from clvol.lab.comparison.measure import uses_sobol
 from clvol.lab.efficiency import Interval
 
@@ -34,23 +35,23 @@ def times(interval: Interval) -> str:
     return f"{interval.value:.3g} ({interval.low:.3g} to {interval.high:.3g})"
 
 
-def sentences(comparison: Comparison) -> list[Sentence]:
+def sentences(findings: Findings) -> list[Sentence]:
     """Everything that a reader should know, the most important first."""
-    found = [Sentence("finding", text) for cost in COSTS for text in _efficiency(comparison, cost)]
-    found += [Sentence("finding", text) for text in _what_significant_means(comparison)]
-    for figures in comparison.figures:
+    found = [Sentence("finding", text) for cost in COSTS for text in _efficiency(findings, cost)]
+    found += [Sentence("finding", text) for text in _what_significant_means(findings)]
+    for figures in findings.figures:
         found += [Sentence("verdict", _verdict(figures)), Sentence("verdict", _slope(figures))]
         if math.isfinite(figures.render_slope.value):
             found.append(Sentence("verdict", _render_slope(figures)))
-    return found + [Sentence("warning", text) for text in _warnings(comparison)]
+    return found + [Sentence("warning", text) for text in _warnings(findings)]
 
 
-def _efficiency(comparison: Comparison, cost: str) -> Iterator[str]:
-    known = {f.label: f.efficiency[cost] for f in comparison.figures if cost in f.efficiency}
-    spp = {f.label: f.measured.spp for f in comparison.figures}
+def _efficiency(findings: Findings, cost: str) -> Iterator[str]:
+    known = {f.label: f.efficiency[cost] for f in findings.figures if cost in f.efficiency}
+    spp = {f.label: f.measured.spp for f in findings.figures}
     if not known:
         return
-    base = comparison.baseline
+    base = findings.baseline
     others = {label: e for label, e in known.items() if label != base}
     for label, e in sorted(others.items(), key=lambda item: -item[1].ratio.value):
         at = f"{spp[label]}" if spp[label] == spp[base] else f"{spp[label]} against {spp[base]}"
@@ -60,9 +61,9 @@ def _efficiency(comparison: Comparison, cost: str) -> Iterator[str]:
         )
 
 
-def _what_significant_means(comparison: Comparison) -> Iterator[str]:
+def _what_significant_means(findings: Findings) -> Iterator[str]:
     """Once, whatever the kinds of cost: each has the same number of tests."""
-    others = [f for f in comparison.figures if f.label != comparison.baseline]
+    others = [f for f in findings.figures if f.label != findings.baseline]
     known = [
         COSTS[c]
         for c in COSTS
@@ -71,7 +72,7 @@ def _what_significant_means(comparison: Comparison) -> Iterator[str]:
     if len(others) > 1 and known:
         yield (
             f"Significant means that the chance of calling any of these {len(others)} wrongly different from "
-            f"{comparison.baseline} is {100 * LEVEL:.0f} %, by {' and by '.join(known)} each (Holm's "
+            f"{findings.baseline} is {100 * LEVEL:.0f} %, by {' and by '.join(known)} each (Holm's "
             "correction); intervals are 95 % each."
         )
 
@@ -144,23 +145,23 @@ def _render_slope(figures: Figures) -> str:
     )
 
 
-def _warnings(comparison: Comparison) -> Iterator[str]:
-    if comparison.interrupted:
-        count = len(comparison.figures[0].seconds)
+def _warnings(findings: Findings) -> Iterator[str]:
+    if findings.interrupted:
+        count = len(findings.figures[0].seconds)
         yield f"Interrupted: only the {count} rounds that were complete are in this report."
-    for said, why in comparison.left_out:
+    for said, why in findings.left_out:
         yield f"{said} is left out: {why}."
-    for said, label in comparison.doubles:
+    for said, label in findings.doubles:
         if said == label:
             yield f"{label} was asked for in more than one way, and was measured once."
         else:
             yield f"{said} comes to the same as {label} on this scene, and was measured once."
-    if not comparison.reference.variance_known:
+    if not findings.reference.variance_known:
         yield (
             "The reference came without its variance, which could not be subtracted: all errors are too "
             "large by the same amount, curves flatten, and disagreement with it may be its own noise."
         )
-    for figures in comparison.figures:
+    for figures in findings.figures:
         share, count = figures.worst_round, len(figures.seconds)
         if share > max(_HEAVY, 4 / count):
             yield (
@@ -191,7 +192,7 @@ VERDICTS = {
 """In the summary, by what its label says and whether it agrees with the reference."""
 
 
-def table_rows(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
+def table_rows(findings: Findings) -> tuple[list[str], list[list[str]]]:
     """Headings and rows of the summary."""
     heads = [
         "combination",
@@ -207,10 +208,10 @@ def table_rows(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
         "verdict",
     ]
     rows = []
-    for f in comparison.figures:
+    for f in findings.figures:
         pixels = f.measured.images[0, ..., 0].size
         per_sample = float(f.measured.lookups.mean()) / (pixels * f.measured.spp)
-        ratios = [_cell(f, cost, comparison.baseline) for cost in COSTS]
+        ratios = [_cell(f, cost, findings.baseline) for cost in COSTS]
         slopes = [f"{s.value:.2f}" if math.isfinite(s.value) else "–" for s in (f.slope, f.render_slope)]
         rows.append(
             [
@@ -237,7 +238,7 @@ def _cell(figures: Figures, cost: str, baseline: str) -> str:
     return times(e.ratio).replace(" to ", "–") + (" *" if e.significant else "")
 
 
-def text_table(comparison: Comparison, width: int | None = None) -> str:
+def text_table(findings: Findings, width: int | None = None) -> str:
     """The summary as plain text: a table, or a paragraph each where that is wider than `width` characters.
 
     None takes the terminal's width, and any where there is none.  Nothing is cut.
@@ -247,7 +248,7 @@ def text_table(comparison: Comparison, width: int | None = None) -> str:
     from rich.table import Table
     from rich.text import Text
 
-    heads, rows = table_rows(comparison)
+    heads, rows = table_rows(findings)
     table = Table(box=box.SIMPLE, title=None)
     for number, head in enumerate(heads):
         table.add_column(head, justify="left" if number == 0 else "right")
@@ -259,8 +260,8 @@ def text_table(comparison: Comparison, width: int | None = None) -> str:
     width = _terminal_width() if width is None else width
     if width and max(map(len, lines)) > width:
         lines = [line for row in rows for line in _paragraph(heads, row, width)]
-    if any(e.significant for f in comparison.figures for e in f.efficiency.values()):
-        lines.append(f"* significantly different from {comparison.baseline}")
+    if any(e.significant for f in findings.figures for e in f.efficiency.values()):
+        lines.append(f"* significantly different from {findings.baseline}")
     return "\n".join(lines)
 
 

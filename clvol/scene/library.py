@@ -1,4 +1,4 @@
-"""From nodes to records: finds a plugin's kind, follows references, and builds each node once."""
+"""What a scene's nodes are: finds a plugin's kind, follows references, and keeps what has been built."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from clvol.errors import SceneError
-from clvol.scene.nodes import MAX_DEPTH, Node
-from clvol.scene.reader import Reader
+from clvol.scene.nodes import Node
 from clvol.scene.vocabulary import LATER, did_you_mean, join_hints, listed
 
 if TYPE_CHECKING:
@@ -15,18 +14,19 @@ if TYPE_CHECKING:
 
     from clvol.volumes.grid import Grid
 
-PluginTable = Mapping[str, Mapping[str, Callable[[Reader], object]]]
+PluginTable = Mapping[str, Mapping[str, Callable[[Any], object]]]
+"""By kind and name of the plugin; each function turns a `clvol.scene.reader.Reader` into a record."""
 
 
-class Builder:
-    """Builds the plugins of one scene.
+class Library:
+    """The plugins of one scene: which there are, what they are called, and the records of those built.
 
     Parameters
     ----------
     root : Node
         The scene, searched for ids.
-    plugins : mapping of kind to mapping of plugin name to function
-        What is supported; each function turns a `Reader` into a record.
+    plugins : PluginTable
+        What is supported.
 
     Raises
     ------
@@ -39,9 +39,9 @@ class Builder:
         self.grids: dict[tuple[Path, str | None], Grid] = {}
         self.reduced: dict[int, Any] = {}  # by id() of a grid or volume that `grids` or a record keeps alive
         self.taken: set[int] = set()  # id() of every plugin that another one holds or refers to
+        self.built: dict[int, Any] = {}  # records, by id() of their node
+        self.open: list[Node] = []  # what is being built, the outermost first
         self._ids: dict[str, Node] = {}
-        self._built: dict[int, Any] = {}
-        self._open: list[Node] = []
         self._collect_ids(root)
         for alias, (target, where) in root.aliases.items():
             self._add_alias(alias, target, where)
@@ -111,17 +111,3 @@ class Builder:
         if node.type in LATER.get(kind, ()):
             what, guess = f"{kind} '{node.type}' is not supported in this version", ""
         raise SceneError(what, node.where, join_hints(guess, f"supported: {listed(supported)}"))
-
-    def build(self, node: Node) -> Any:
-        """The record of a node; the same object each time, so that what is shared stays shared."""
-        if id(node) not in self._built:
-            self.check_supported(node)
-            if any(node is outer for outer in self._open) or len(self._open) > MAX_DEPTH:
-                raise SceneError(f"'{node.type}' is nested without end", node.where)
-            self._open.append(node)
-            reader = Reader(node, self)
-            record = self.plugins[reader.kind][node.type](reader)
-            reader.finish()
-            self._open.pop()
-            self._built[id(node)] = record
-        return self._built[id(node)]

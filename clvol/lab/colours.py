@@ -1,0 +1,10 @@
+"""Okabe and Ito's colours, which colour-blind readers tell apart too."""
+
+BLACK = "#000000"
+BLUE = "#0072b2"
+GREEN = "#009e73"
+GREY = "#9a9a9a"
+ORANGE = "#e69f00"
+PURPLE = "#cc79a7"
+SKY = "#56b4e9"
+VERMILION = "#d55e00"

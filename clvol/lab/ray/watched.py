@@ -1,0 +1,88 @@
+"""One camera ray and what walks did along it, in numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from clvol.lab.ray.place import Place
+from clvol.lab.ray.walks import Watched
+
+CHANNEL_NAMES = ("red", "green", "blue")
+DARK = 1e-3
+"""Transmittance beyond which there is little to see."""
+
+
+@dataclass(frozen=True, eq=False)
+class WatchedRay:
+    """One camera ray through its first medium, and what walks did along it.
+
+    scene, pixel, medium, seed, device : what was looked at, and with which numbers.
+    place : where the ray enters the medium, and how long it stays; world lengths.
+    channel : number of the channel that is shown, of ``len(sigma_t)``.
+    sigma_t : float64 (channels, n), at the middles of n even steps.
+    watched : each technique and transmittance, in the order asked for.
+    notes : what a viewer has to know.
+    """
+
+    scene: str
+    pixel: tuple[int, int]
+    medium: str
+    seed: int
+    device: str
+    place: Place
+    channel: int
+    sigma_t: np.ndarray
+    watched: tuple[Watched, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def edges(self) -> np.ndarray:
+        """Ends of the steps, float64 (n + 1,), from the medium's entry."""
+        return np.linspace(0.0, self.place.length, self.sigma_t.shape[1] + 1)
+
+    @property
+    def window(self) -> tuple[float, float]:
+        """The part worth a look, from the medium's entry: from its first matter to where walks have
+        ended and little light is left."""
+        matter = np.flatnonzero(self.sigma_t.any(axis=0))
+        first, last = self.edges[matter[0]], self.edges[matter[-1] + 1]
+        for watched in self.watched:
+            if watched.rate() is not None:
+                first = min(first, *watched.cells[watched.rate() > 0, 0].tolist())
+        dark = np.flatnonzero(self.transmittance[self.channel] < DARK)
+        if len(dark):
+            ends = [walk.reach(self.channel) for watched in self.watched for walk in watched.walks]
+            last = max(self.edges[dark[0]], *[self.place.length if end is None else end for end in ends])
+        margin = 0.03 * (last - first)
+        return max(first - margin, 0.0), min(last + margin, self.place.length)
+
+    @property
+    def depth(self) -> np.ndarray:
+        """Optical depth from the entry to each of `edges`, float64 (channels, n + 1): the midpoint rule."""
+        step = self.place.length / self.sigma_t.shape[1]
+        return np.pad(np.cumsum(self.sigma_t, axis=1) * step, [(0, 0), (1, 0)])
+
+    @property
+    def transmittance(self) -> np.ndarray:
+        """exp(-depth), float64 (channels, n + 1)."""
+        return np.exp(-self.depth)
+
+    @property
+    def bound_notes(self) -> list[str]:
+        """A sentence where other channels rise above majorants, which are of the channel that is shown."""
+        others = np.delete(self.sigma_t, self.channel, axis=0)
+        middles, exceeded = (self.edges[1:] + self.edges[:-1]) / 2, []
+        for watched in self.watched:
+            if watched.rate() is None or watched.name == "residual-ratio" or not len(others):
+                continue
+            cells = watched.cells
+            place = np.minimum(np.searchsorted(cells[:, 1], middles), len(cells) - 1)
+            inside = (middles >= cells[0, 0]) & (middles <= cells[-1, 1])
+            if (inside & (others > 1.001 * watched.rate()[place])).any():
+                exceeded.append(watched.label)
+        if not exceeded:
+            return []
+        shown = CHANNEL_NAMES[self.channel]
+        return [f"Majorants of {', '.join(exceeded)} are bounds of the {shown} channel only."]
