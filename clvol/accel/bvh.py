@@ -17,10 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clvol.accel.bvh_split import PACKET, BinaryTree, half_area, split_boxes
+from clvol.accel.bvh_split import BinaryTree, half_area, split_boxes
 from clvol.errors import SceneError
+from clvol.layout import BVH_PACKET, BVH_WIDTH
 
-WIDTH = 8
 NODE_ROWS, PACKET_ROWS = 8, 10
 LEAF, HAS_QUADRICS = np.uint32(1 << 31), np.uint32(1 << 30)
 """Marks in a child's reference; what remains is the number of the node, or of the packet."""
@@ -151,7 +151,7 @@ def _collapse(tree: BinaryTree) -> tuple[np.ndarray, np.ndarray, int, int]:
         references = np.zeros(slots.shape, np.uint32)
         references[inner] = known + np.arange(np.count_nonzero(inner))
         references[leaf] = (packets + np.arange(np.count_nonzero(leaf))).astype(np.uint32) | LEAF
-        block = np.zeros((len(slots), NODE_ROWS, WIDTH), np.float32)
+        block = np.zeros((len(slots), NODE_ROWS, BVH_WIDTH), np.float32)
         for axis in range(3):
             block[:, 2 * axis] = np.where(used, tree.box[axis][slots], np.inf)
             block[:, 2 * axis + 1] = np.where(used, -tree.box[axis + 3][slots], -np.inf)
@@ -168,12 +168,12 @@ def _widest_children(tree: BinaryTree, area: np.ndarray, nodes: np.ndarray) -> n
 
     The one of the largest surface is replaced by its two halves, six times.
     """
-    slots = np.full((len(nodes), WIDTH), -1, np.int32)
+    slots = np.full((len(nodes), BVH_WIDTH), -1, np.int32)
     splits = tree.left[nodes] >= 0  # else the root is a leaf
     slots[:, 0] = np.where(splits, tree.left[nodes], nodes)
     slots[splits, 1] = tree.left[nodes[splits]] + 1
     rows, filled = np.arange(len(nodes)), np.where(splits, 2, 1)
-    for _ in range(WIDTH - 2):
+    for _ in range(BVH_WIDTH - 2):
         opens = (slots >= 0) & (tree.left[slots] >= 0)
         widest = np.argmax(np.where(opens, area[slots], np.float32(-1)), axis=1)
         row = rows[opens[rows, widest]]
@@ -186,10 +186,10 @@ def _widest_children(tree: BinaryTree, area: np.ndarray, nodes: np.ndarray) -> n
 
 def _packets(tree: BinaryTree, leaves: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """One packet a leaf; lanes of quadrics and unused ones have three equal vertices, which no ray hits."""
-    packets = np.zeros((len(leaves), PACKET_ROWS, WIDTH), np.float32)
-    lanes = np.arange(PACKET)
-    for first in range(0, len(leaves), _CHUNK // PACKET):
-        part = leaves[first : first + _CHUNK // PACKET]
+    packets = np.zeros((len(leaves), PACKET_ROWS, BVH_WIDTH), np.float32)
+    lanes = np.arange(BVH_PACKET)
+    for first in range(0, len(leaves), _CHUNK // BVH_PACKET):
+        part = leaves[first : first + _CHUNK // BVH_PACKET]
         used = lanes < tree.count[part][:, None]
         primitive = np.full(used.shape, NO_PRIMITIVE)
         primitive[used] = tree.order[(tree.first[part][:, None] + lanes)[used]]

@@ -1,8 +1,8 @@
 """Binary trees over boxes by binned surface-area heuristic (Wald 2007), all nodes of a level at once.
 
-A leaf is one packet of at most PACKET primitives, which the device tests together, so that what a node costs
-is its number of packets.  Boxes are kept as six rows (lower x, y, z, -upper x, y, z): every reduction is a
-minimum.  A level's nodes are worked on in chunks, to bound the temporaries.
+A leaf is one packet of at most BVH_PACKET primitives, which the device tests together, so that what a node
+costs is its number of packets.  Boxes are kept as six rows (lower x, y, z, -upper x, y, z): every reduction
+is a minimum.  A level's nodes are worked on in chunks, to bound the temporaries.
 """
 
 from __future__ import annotations
@@ -11,10 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-PACKET = 8
-"""Primitives that a leaf holds at most: the width of the device's vectors."""
-MOST_DEPTH = 48
-"""Splits on the way to a leaf, at most: nodes that could become deeper are halved by number."""
+from clvol.layout import BVH_MOST_DEPTH, BVH_PACKET
+
 _BINS = 16
 _CHUNK = 1 << 18
 
@@ -61,7 +59,7 @@ def split_boxes(box: np.ndarray) -> BinaryTree:
     leaves, leaf_total, known, depth = [], 0, 1, 0
     while len(start) > 1:
         counts = np.diff(start)
-        inner = counts > PACKET
+        inner = counts > BVH_PACKET
         children = np.full(len(counts), -1, np.int32)
         children[inner] = known + 2 * np.arange(np.count_nonzero(inner))
         known += 2 * int(np.count_nonzero(inner))
@@ -113,8 +111,8 @@ def _choose_splits(order: np.ndarray, box: np.ndarray, start: np.ndarray, depth:
     )
     for first, last in _chunks(start):
         _choose_in_chunk(level, first, last)
-    packets = np.diff(start) / PACKET
-    level.axis[depth + np.ceil(np.log2(packets)) >= MOST_DEPTH] = -1
+    packets = np.diff(start) / BVH_PACKET
+    level.axis[depth + np.ceil(np.log2(packets)) >= BVH_MOST_DEPTH] = -1
     return level
 
 
@@ -159,7 +157,7 @@ def _plane_costs(box: np.ndarray, key: np.ndarray, nodes: int, bins: int) -> np.
     above = number.sum(axis=1, keepdims=True) - below
     lower_area = half_area(np.minimum.accumulate(binned, axis=2))[:, :-1]
     upper_area = half_area(np.minimum.accumulate(binned[:, :, ::-1], axis=2))[:, -2::-1]
-    cost = lower_area * -(-below // PACKET) + upper_area * -(-above // PACKET)
+    cost = lower_area * -(-below // BVH_PACKET) + upper_area * -(-above // BVH_PACKET)
     return np.where((below > 0) & (above > 0), cost, np.inf).astype(np.float32)
 
 

@@ -161,7 +161,7 @@ def compose(config: KernelConfig, headers: list[str], body: str) -> str:
     lines = []
     for name in ("core/types.h", "core/random.h"):
         lines += _expand(name, seen)
-    lines += ['#line 1 "layout"', *layout.layout_text(config).splitlines()]
+    lines += ['#line 1 "layout"', *layout.layout_text(config.macros).splitlines()]
     reads = config.top_trees and any(name.startswith("density/") for name in headers)
     trees = ["geometry/lattice_tree.h"] if reads else []
     for name in (registry.SAMPLERS[config.sampler].header, *trees, *headers):
@@ -171,7 +171,7 @@ def compose(config: KernelConfig, headers: list[str], body: str) -> str:
         lines += _expand(match[1], seen) if match else [line]
     text = "\n".join(lines) + "\n"
     used = set(re.findall(r"\bCLVOL_\w+", text))
-    defines = [f"#define {name} {value}\n" for name, value in config.defines().items() if name in used]
+    defines = [f"#define {name} {value}\n" for name, value in config.macros.items() if name in used]
     return "/* Composed by clvol. */\n" + "".join(defines) + text
 
 

@@ -5,17 +5,13 @@ A plain value; everything that decides which code is built is here and in `featu
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
-from clvol.accel.bvh import WIDTH
-from clvol.accel.bvh_split import MOST_DEPTH
+from clvol import layout
 from clvol.planning import registry
 from clvol.planning.features import Features
-from clvol.scene.materials import BSDFS
-from clvol.tables.sobol import RANDOMIZATIONS
-
-BVH_STACK = (WIDTH - 1) * MOST_DEPTH + 1
-"""Nodes that a traversal of the surfaces' hierarchy may keep waiting: siblings on every level."""
 
 
 @dataclass(frozen=True)
@@ -115,12 +111,18 @@ class KernelConfig:
     @property
     def randomizations(self) -> int:
         """Independent randomisations that the samples are dealt to; 0 where every sample is independent."""
-        return RANDOMIZATIONS if self.sampler == "sobol" else 0
+        return layout.RANDOMIZATIONS if self.sampler == "sobol" else 0
 
     @property
     def first_hit(self) -> tuple[str, ...]:
         """Pictures of what camera paths first meet that `aov` asks for."""
         return tuple(name for name in registry.FIRST_HIT if name in self.aov)
+
+    @property
+    def shown(self) -> frozenset[str]:
+        """Pictures whose numbers are kept: those of `aov`, look-ups, and what others are made from."""
+        of = {"null": ("tentative", "real"), "efficiency": ("cells",)}
+        return frozenset(("lookups", *self.aov, *(n for name in self.aov for n in of.get(name, ()))))
 
     @property
     def stages(self) -> tuple[str, ...]:
@@ -133,8 +135,9 @@ class KernelConfig:
             stages.append("shadow_transmittance")
         return tuple(stages)
 
-    def defines(self) -> dict[str, int]:
-        """``CLVOL_*`` macros of the composed units; every value is an integer."""
+    @cached_property
+    def macros(self) -> Mapping[str, int]:
+        """``CLVOL_*`` macros: what is compiled, and what a path's state and the kernels' arguments hold."""
         f = self.features
         return {
             "CLVOL_LOCAL_SIZE": self.local_size,
@@ -155,6 +158,7 @@ class KernelConfig:
             "CLVOL_HAS_THIN": int(f.thin),
             "CLVOL_HAS_CUBE": int(f.cubes),
             "CLVOL_HAS_SPHERE": int(f.spheres),
+            "CLVOL_HAS_VOLUMES": int(f.volumes > 0),
             "CLVOL_HAS_TRILINEAR": int(f.trilinear),
             "CLVOL_HAS_NEAREST": int(f.nearest),
             "CLVOL_HAS_TOP_TREES": int(self.top_trees),
@@ -170,6 +174,8 @@ class KernelConfig:
             "CLVOL_HAS_RAYLEIGH": int(f.rayleigh),
             "CLVOL_HAS_BLEND": int(f.blend),
             "CLVOL_HAS_SCATTERING": int(f.scattering),
+            "CLVOL_HAS_EMITTERS": int(f.emitters > 0),
+            "CLVOL_HAS_NEAR_LIGHTS": int(f.near_lights),
             "CLVOL_HAS_CONSTANT": int(f.constant),
             "CLVOL_HAS_ENVMAP": int(f.envmap),
             "CLVOL_HAS_DIRECTIONAL": int(f.directional),
@@ -187,23 +193,31 @@ class KernelConfig:
             "CLVOL_HAS_VERTEX_UVS": int(f.vertex_uvs),
             "CLVOL_HAS_TEXTURES": int(f.textures),
             "CLVOL_HAS_BITMAPS": int(f.bitmaps),
+            "CLVOL_HAS_MATERIAL_TABLES": int(f.material_tables),
             "CLVOL_HAS_REFLECTION": int(f.reflecting),
             "CLVOL_HAS_PASSABLE": int(f.passable),
             "CLVOL_HAS_TRANSMISSION": int(f.transmissive),
             "CLVOL_BOUNDARY_WORDS": f.boundary_words,
             "CLVOL_CAMERA_INSIDE": int(f.camera_inside),
-            "CLVOL_BVH_STACK": BVH_STACK,
-            **{f"CLVOL_BSDF_{name}": int(name in f.bsdfs) for name in BSDFS},
+            "CLVOL_BVH_STACK": layout.BVH_STACK,
+            **{f"CLVOL_BSDF_{name}": int(name in f.bsdfs) for name in layout.BSDFS},
             "CLVOL_HAS_FILTER_TABLE": int(f.filter_table),
             "CLVOL_HAS_SIGNED_FILTER": int(f.signed_filter),
             "CLVOL_HAS_LENS": int(f.lens),
+            "CLVOL_HAS_LONG_WALKS": int(f.heterogeneous or f.passable),
+            "CLVOL_WALKS_GRID": int(self.walks_majorants and self.majorant == "grid"),
+            "CLVOL_WALKS_TREE_GRID": int(self.walks_majorants and self.tree_grid),
+            "CLVOL_WALKS_KDTREE": int(self.walks_majorants and self.majorant == "kdtree"),
+            "CLVOL_HAS_CONTROLS": int(self.needs_controls),
+            "CLVOL_HAS_RESIDUALS": int(self.needs_residuals),
             "CLVOL_HAS_MAX_DEPTH": int(f.depth_limited),
             "CLVOL_HIDE_EMITTERS": int(f.hide_emitters),
             "CLVOL_FIRST_HIT": int(bool(self.first_hit)),
+            **{f"CLVOL_SHOWS_{name.upper()}": int(name in self.shown) for name in registry.AOVS},
             "CLVOL_RANDOMIZATIONS": self.randomizations,
             "CLVOL_PIXEL_LIST": int(self.pixel_list),
             "CLVOL_NEE": int(self.nee),
             "CLVOL_MIS": int(self.mis),
-            "CLVOL_ABSORPTION": tuple(registry.ABSORPTIONS).index(self.absorption),
-            "CLVOL_PROBABILITY": tuple(registry.PROBABILITIES).index(self.probability),
+            "CLVOL_ABSORPTION": layout.enum("ABSORPTION", self.absorption),
+            "CLVOL_PROBABILITY": layout.enum("PROBABILITY", self.probability),
         }

@@ -31,7 +31,6 @@ from clvol.scene.materials import Bsdf
 from clvol.scene.phase import phase_lobes
 from clvol.scene.primitives import canonical_mesh
 from clvol.scene.thinness import thin_media
-from clvol.tables.pixel_filter import SIGNED
 from clvol.volumes.grid import DenseGrid
 
 QUADRICS = ("sphere", "disk", "cylinder")
@@ -176,7 +175,7 @@ class Features:
             samples_lights=bool(emitters or lamps)
             and (any(m.sample_emitters for m in media) or bool(surfaces)),
             filter_table=scene.film.rfilter.kind != "box",
-            signed_filter=scene.film.rfilter.kind in SIGNED,
+            signed_filter=scene.film.rfilter.signed,
             lens=scene.sensor.aperture_radius > 0,
             depth_limited=scene.integrator.max_depth >= 0,
             hide_emitters=scene.integrator.hide_emitters,

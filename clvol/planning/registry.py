@@ -10,6 +10,7 @@ import difflib
 from dataclasses import dataclass
 
 from clvol.errors import OptionError, shown
+from clvol.layout import COUNTS
 
 
 @dataclass(frozen=True)
@@ -163,21 +164,13 @@ FAMILY_PURPOSE = {
     "sampler": "How the samples of a pixel are drawn.",
 }
 
-COUNTS = {
-    "lookups": "density look-ups",
-    "tentative": "tentative collisions",
-    "real": "real collisions",
-    "cells": "majorant cells crossed",
-    "violations": "look-ups above their majorant",
-}
-"""What walks count, per path."""
 FIRST_HIT = {
-    "depth": ("distance from the camera to the first scattering, at a surface or in a medium", 1),
-    "normal": ("shading normal there, 0 in media", 3),
-    "albedo": ("reflectance or single-scattering albedo there", 3),
-    "position": ("that point in the world", 3),
+    "depth": "distance from the camera to the first scattering, at a surface or in a medium",
+    "normal": "shading normal there, 0 in media",
+    "albedo": "reflectance or single-scattering albedo there",
+    "position": "that point in the world",
 }
-"""What camera paths first meet, and its channels; 0 for a path that meets nothing."""
+"""What camera paths first meet; 0 for a path that meets nothing.  Their channels: `layout.FIRST_HIT`."""
 AOVS = (
     COUNTS
     | {
@@ -186,8 +179,9 @@ AOVS = (
         "variance": "variance of a sample, mean over the channels",
         "efficiency": "1 / (variance · seconds), seconds dealt out by look-ups and cells",
     }
-    | {name: summary for name, (summary, _) in FIRST_HIT.items()}
+    | FIRST_HIT
 )
+"""Pictures that may be asked for beside the image; what walks count, per path, comes first."""
 
 
 PILOT = "auto:pilot"

@@ -31,9 +31,9 @@ class Film:
 
     def __init__(self, device: Device, config: KernelConfig, pixels: int, seed: tuple[int, int]) -> None:
         self.device, self.config, self.pixels, self.seed = device, config, pixels, seed
-        self.path_counts = layout.path_counts(config)
-        self.firsts = layout.first_hit_fields(config)
-        self.peaks = 1 + layout.shows_weight(config)
+        self.path_counts = layout.path_counts(config.macros)
+        self.firsts = layout.first_hit_fields(config.macros)
+        self.peaks = 1 + layout.shows_weight(config.macros)
         sizes = {
             "film": 8 * (config.randomizations or 2) * config.channels * pixels,
             "film_peaks": 4 * self.peaks * pixels,
@@ -55,7 +55,7 @@ class Film:
             cl.enqueue_fill_buffer(self.device.queue, buffer, np.uint32(0), 0, buffer.size)
         listed = self.pixels if self.config.pixel_list else 0
         self.samples = np.zeros(listed, np.int64)  # of each pixel, where they are not the same of all
-        self.slot_totals = dict.fromkeys(layout.slot_fields(self.config), 0.0)
+        self.slot_totals = dict.fromkeys(layout.slot_fields(self.config.macros), 0.0)
 
     def _read(self, name: str, shape: tuple[int, ...], dtype: type) -> np.ndarray:
         array = np.empty(shape, dtype)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from clvol import layout
 from clvol.picture.estimate import Estimate
 from clvol.picture.result import Result, said_ranges
 from clvol.planning import registry
@@ -126,7 +127,7 @@ def _efficiency(
 def _first_hit(session: Session, name: str, paths: np.ndarray) -> np.ndarray:
     """A picture of what camera paths first met: means over `paths` paths, float64 (pixels[, 3])."""
     sums = session.wavefront.film.first_hits()
-    channels = registry.FIRST_HIT[name][1]
+    channels = layout.FIRST_HIT[name]
     means = np.stack([sums[f"{name}_{c}"] / paths for c in range(channels)], axis=1)
     if name == "position":  # the device's are relative to the centre
         means += (sums["met"] / paths)[:, None] * session.prepared.centre
@@ -138,7 +139,7 @@ def statistics(session: Session, samples: int) -> dict[str, Any]:
     wavefront, film = session.wavefront, session.wavefront.film
     slots = wavefront.slot_statistics()
     peaks = {n: float(p.max(initial=0.0)) for n, p in film.peaks_by_pixel().items()}
-    counts = {n: int(slots.get(n, 0)) for n in registry.COUNTS}
+    counts = {n: int(slots.get(n, 0)) for n in layout.COUNTS}
     counts |= {n: int(c.sum()) for n, c in film.counts().items()}
     paths = samples * session.config.jobs_per_sample
     stats = {

@@ -32,7 +32,7 @@ def upload_scene(
     volumes = {key: number for number, key in enumerate(prepared.volumes)}
     emitters = emitter_order(prepared.scene)
     buffers: dict[str, cl.Buffer] = {}
-    needed = {argument.name for argument in layout.arguments(config)}
+    needed = {argument.name for argument in layout.arguments(config.macros)}
     if "sobol" in needed:
         buffers["sobol"] = _buffer(device, block_table())
     if "volumes" in needed:

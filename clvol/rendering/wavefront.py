@@ -90,7 +90,7 @@ class Wavefront:
         self.buffers: dict[str, cl.Buffer] = {}
         self.list_pixels(None)
         self.groups = pool.slots // config.group_slots
-        self.fields = layout.path_fields(config)
+        self.fields = layout.path_fields(config.macros)
         self.film = self.new_film(tuple(int(word) for word in render["seed"][0]))
         self._harvested = time.perf_counter()
         self.stride = pool.slots + 16  # off the power of two, or all fields of a slot share a cache set
@@ -113,7 +113,7 @@ class Wavefront:
             sizes["result_firsts"] = 4 * len(self.film.firsts) * ring_jobs
         if self.config.pixel_list:
             sizes["pixel_list"] = 8 * self.pixels
-        if stride := layout.counts_per_path(self.config):
+        if stride := layout.counts_per_path(self.config.macros):
             sizes["result_counts"] = 4 * stride * ring_jobs
         self.buffers = {name: self._buffer(size) for name, size in sizes.items()} | scene_buffers
         self.bytes = sum(sizes.values()) + sum(b.size for b in scene_buffers.values())
@@ -123,7 +123,7 @@ class Wavefront:
         self._write("control", np.zeros(_DONE + self.pool.ring_passes, np.uint32))
         values = [
             np.uint32(self.stride) if argument.name == "slot_stride" else self.buffers[argument.name]
-            for argument in layout.arguments(self.config)
+            for argument in layout.arguments(self.config.macros)
         ]
         for stage in self.config.stages:
             set_arguments(self.kernels[stage], *values)

@@ -12,19 +12,6 @@ import numpy as np
 
 Spectrum = tuple[float, ...]
 
-BSDFS = (
-    "NULL",
-    "DIFFUSE",
-    "DIELECTRIC",
-    "THIN_DIELECTRIC",
-    "ROUGH_DIELECTRIC",
-    "CONDUCTOR",
-    "ROUGH_CONDUCTOR",
-    "PLASTIC",
-    "ROUGH_PLASTIC",
-)
-"""Kinds of material on the device; wrappers have none of their own."""
-
 
 @dataclass(frozen=True, eq=False)
 class Bitmap:

@@ -35,11 +35,16 @@ def as_spectrum(value: float | Iterable[float]) -> Spectrum:
 class ReconstructionFilter:
     """Pixel filter; `radius` and `stddev` in pixels (stddev only for the Gaussian)."""
 
-    kind: str = "gaussian"  # "box" | "tent" | "gaussian" | "mitchell"
+    kind: str = "gaussian"  # "box" | "tent" | "gaussian" | "mitchell" | "lanczos"
     radius: float = 2.0
     stddev: float = 0.5
     b: float = 1 / 3  # of mitchell
     c: float = 1 / 3
+
+    @property
+    def signed(self) -> bool:
+        """Whether it may be negative somewhere."""
+        return self.kind in ("mitchell", "lanczos")
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from clvol.layout import BLACKBODY_BINS, BLACKBODY_MIDDLE_KELVIN
 from clvol.scene.spectra import XYZ_TO_SRGB, observer
 from clvol.tables.environment import luminance
 
@@ -14,10 +15,6 @@ if TYPE_CHECKING:
 
 SECOND_RADIATION_NM_K = 1.438776877e7
 """Planck's h c / k, in nm K."""
-MIDDLE_KELVIN = 3000.0
-"""Temperature in the middle of the table, where colours change most."""
-BINS = 1024
-"""Entries of the table that the device interpolates: within 1e-3 of the largest channel."""
 _COLDEST_KELVIN = 1e-3
 """Far below this nothing changes any more: all that is seen is the longest wavelength."""
 
@@ -39,14 +36,14 @@ def blackbody_rgb(kelvin: ArrayLike) -> np.ndarray:
     return np.where(kelvin[:, None] > 0, rgb / luminance(rgb)[:, None], 0.0)
 
 
-def blackbody_table(bins: int = BINS) -> np.ndarray:
+def blackbody_table(bins: int = BLACKBODY_BINS) -> np.ndarray:
     """`blackbody_rgb` for linear interpolation, float32 (bins, 3).
 
-    Evenly spaced in u = kelvin / (kelvin + MIDDLE_KELVIN) from 0, the limit of cold bodies, to 1, that of
-    hot ones.
+    Evenly spaced in u = kelvin / (kelvin + BLACKBODY_MIDDLE_KELVIN) from 0, the limit of cold bodies, to 1,
+    that of hot ones.
     """
     u = np.linspace(0.0, 1.0, bins)
     with np.errstate(divide="ignore"):
-        kelvin = MIDDLE_KELVIN * u / (1.0 - u)
+        kelvin = BLACKBODY_MIDDLE_KELVIN * u / (1.0 - u)
     kelvin[0] = _COLDEST_KELVIN
     return blackbody_rgb(kelvin).astype(np.float32)

@@ -15,19 +15,17 @@ if TYPE_CHECKING:
     from clvol.scene.records import ReconstructionFilter
 
 FILTER_BINS = 1024
-SIGNED = ("mitchell", "lanczos")
-"""Filters that may be negative somewhere."""
 
 
 def filter_cdf(rfilter: ReconstructionFilter) -> np.ndarray:
     """What offsets along one axis are drawn from, at FILTER_BINS + 1 even points of [-radius, radius].
 
-    float32 (FILTER_BINS + 1,): the integral of the filter's magnitude up to there, from 0 to 1.  For a filter
-    of `SIGNED` a second row follows with the integral of the filter itself, in the same units.  Within a bin
+    float32 (FILTER_BINS + 1,): the integral of the filter's magnitude up to there, from 0 to 1.  For a signed
+    filter a second row follows with the integral of the filter itself, in the same units.  Within a bin
     the filter counts as constant.  The box needs none.
     """
     mass = np.diff(_integral(rfilter, np.linspace(-rfilter.radius, rfilter.radius, FILTER_BINS + 1)))
-    rows = np.stack([np.abs(mass), mass]) if rfilter.kind in SIGNED else mass[None]
+    rows = np.stack([np.abs(mass), mass]) if rfilter.signed else mass[None]
     sums = np.concatenate([np.zeros((len(rows), 1)), np.cumsum(rows, axis=1)], axis=1) / np.abs(mass).sum()
     return sums.astype(np.float32).reshape(-1)
 

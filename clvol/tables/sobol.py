@@ -11,15 +11,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from clvol.layout import RANDOMIZATIONS
+
 _JOE_KUO = (  # from dimension 1 on: degree, coefficients of the primitive polynomial, first numbers m
     (1, 0, (1,)),
     (2, 1, (1, 3)),
     (3, 1, (1, 3, 1)),
 )
 DIMENSIONS = 1 + len(_JOE_KUO)
-
-RANDOMIZATIONS = 4
-"""Independent randomisations that the samples of a pixel are dealt to in turn; a power of two."""
 
 
 def direction_numbers() -> np.ndarray:

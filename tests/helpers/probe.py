@@ -107,7 +107,7 @@ class Probe:
         dummy = cl.Buffer(self.device.context, cl.mem_flags.READ_WRITE, 4)
         scene = [
             np.uint32(1) if a.name == "slot_stride" else self.buffers.get(a.name, dummy)
-            for a in layout.arguments(self.config)
+            for a in layout.arguments(self.config.macros)
         ]
         count = outputs[0].shape[0]
         kernel(self.device.queue, (-(-count // 64) * 64,), (64,), *scene, *arrays, np.uint32(count))

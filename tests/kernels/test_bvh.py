@@ -6,8 +6,8 @@ import trimesh
 from rays import NO_BOXES, NO_FACES, NO_VERTICES, Caster, all_hits, directions
 
 from clvol.accel.bvh import HAS_QUADRICS, LEAF, NO_PRIMITIVE, build_bvh, check_mesh, drop_degenerate
-from clvol.accel.bvh_split import MOST_DEPTH, PACKET
 from clvol.errors import SceneError
+from clvol.layout import BVH_MOST_DEPTH, BVH_PACKET
 
 AXES = np.concatenate([np.eye(3), -np.eye(3)])
 
@@ -224,9 +224,9 @@ def test_hard_inputs_give_bounded_trees_that_hold_every_triangle_once(name):
     numbers = bvh.packets[:, 9].view(np.uint32)
     assert np.array_equal(np.sort(numbers[numbers != NO_PRIMITIVE]), np.arange(len(faces)))
     assert np.array_equal(np.sort(leaves_of(bvh) & ~LEAF), np.arange(len(bvh.packets)))
-    assert bvh.depth <= MOST_DEPTH
+    assert bvh.depth <= BVH_MOST_DEPTH
     assert bvh.stack <= 7 * bvh.depth + 1
-    assert len(bvh.packets) <= max(1, len(faces) // (PACKET // 4))
+    assert len(bvh.packets) <= max(1, len(faces) // (BVH_PACKET // 4))
 
 
 def test_boxes_hold_their_triangles_with_room():

@@ -29,9 +29,9 @@ from clvol.lab.comparison.result import Comparison
 from clvol.lab.comparison.shorter import render_slope, shorter_spp
 from clvol.lab.comparison.words import _slope, text_table
 from clvol.lab.efficiency import Interval
+from clvol.layout import RANDOMIZATIONS
 from clvol.picture.image_io import encode_exr, split_channels
 from clvol.planning.registry import FAMILIES
-from clvol.tables.sobol import RANDOMIZATIONS
 
 FALSE_ALARM = 1e-4
 SIZE = 16

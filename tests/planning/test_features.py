@@ -87,11 +87,11 @@ def headers(config):
 
 
 def argument_names(config):
-    return {a.name for a in layout.arguments(config)}
+    return {a.name for a in layout.arguments(config.macros)}
 
 
 def field_names(config):
-    return {f.name for f in layout.path_fields(config)}
+    return {f.name for f in layout.path_fields(config.macros)}
 
 
 # -- stages ------------------------------------------------------------------------------------------
@@ -212,7 +212,7 @@ def test_the_distance_to_a_light_is_kept_only_for_point_lights(device):
 
 
 def bytes_per_slot(config):
-    return 4 * len(layout.path_fields(config))
+    return 4 * len(layout.path_fields(config.macros))
 
 
 def test_grey_scenes_carry_one_channel_and_smaller_paths(device):
@@ -397,7 +397,7 @@ def test_what_only_passable_or_transmissive_surfaces_need_comes_with_them(device
 def test_a_camera_looks_for_what_it_is_inside_of_only_where_it_may_be(device):
     for centre, inside in ((0.5, 0.5, 0.0), 0), ((0.5, 0.5, -2.0), 1):
         shape = replace(ball(centre, 0.4, homogeneous(1.0, 0.5)), bsdf=Dielectric())
-        assert config_of(device, scene([shape])).defines()["CLVOL_CAMERA_INSIDE"] == inside
+        assert config_of(device, scene([shape])).macros["CLVOL_CAMERA_INSIDE"] == inside
 
 
 # -- the device --------------------------------------------------------------------------------------
@@ -410,7 +410,7 @@ def test_composed_sources_of_every_stage_build(device, name):
     assert tuple(kernels) == (*config.stages, "accumulate")
     for stage, kernel in kernels.items():
         if stage != "accumulate":
-            assert kernel.num_args == len(layout.arguments(config))
+            assert kernel.num_args == len(layout.arguments(config.macros))
 
 
 def test_a_unit_is_self_contained_and_names_files_and_lines(device):

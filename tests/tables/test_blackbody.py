@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from clvol.layout import BLACKBODY_BINS, BLACKBODY_MIDDLE_KELVIN
 from clvol.scene.spectra import XYZ_TO_SRGB, sampled_to_rgb
-from clvol.tables.blackbody import BINS, MIDDLE_KELVIN, blackbody_rgb, blackbody_table
+from clvol.tables.blackbody import blackbody_rgb, blackbody_table
 from clvol.tables.environment import luminance
 
 LOCUS = [  # CIE 1931 2°: kelvin, x, y of the Planckian locus
@@ -51,7 +52,7 @@ def test_what_has_no_temperature_does_not_glow():
 
 def interpolated(kelvin, table):
     """As the device reads the table."""
-    at = kelvin / (kelvin + MIDDLE_KELVIN) * (len(table) - 1)
+    at = kelvin / (kelvin + BLACKBODY_MIDDLE_KELVIN) * (len(table) - 1)
     bin_ = np.minimum(at.astype(int), len(table) - 2)
     part = (at - bin_)[:, None]
     return (1 - part) * table[bin_] + part * table[bin_ + 1].astype(float)
@@ -61,7 +62,7 @@ def test_the_table_interpolates_to_the_exact_colours():
     kelvin = np.geomspace(300, 40000, 20_001)
     exact = blackbody_rgb(kelvin)
     table = blackbody_table()
-    assert (table.dtype, table.shape) == (np.float32, (BINS, 3))
+    assert (table.dtype, table.shape) == (np.float32, (BLACKBODY_BINS, 3))
     assert np.isfinite(table).all()
     error = np.abs(interpolated(kelvin, table) - exact).max(axis=1) / exact.max(axis=1)
     assert error.max() < 1e-3

@@ -125,7 +125,7 @@ class RayKernels:
         unused = memory.allocate(4, "an argument", "")
         scene = [
             np.uint32(1) if a.name == "slot_stride" else self.buffers.get(a.name, unused)
-            for a in layout.arguments(self.config)
+            for a in layout.arguments(self.config.macros)
         ]
         arrays = [memory.upload(array, "the walks", "watch fewer of them") for array in (*inputs, *outputs)]
         set_arguments(kernel, *scene, *arrays, *scalars)
