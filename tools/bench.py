@@ -25,7 +25,7 @@ from bench_tables import Figures, Row, Unavailable, judge, save
 from documents import writable
 from scene_options import choice_options, open_scene
 
-from clvol.cli.options import OneLineErrors
+from clvol.cli.messages import OneLineErrors
 
 CLOUD = str(Path(__file__).resolve().parent.parent / "scenes" / "cloud.xml")
 POOL_SIZES = (2048, 8192, 32768)

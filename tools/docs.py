@@ -21,7 +21,7 @@ from docs_tables import ROOT, performance_part, pilot_page, techniques_page
 from documents import between, writable, write
 from pilot import SCENES, pilot_options, tested
 
-from clvol.cli.options import OneLineErrors
+from clvol.cli.messages import OneLineErrors
 
 DOCS, README = ROOT / "docs", ROOT / "README.md"
 FIRST, LAST = "<!-- performance: written by tools/docs.py -->", "<!-- end of performance -->"

@@ -10,7 +10,8 @@ from pathlib import Path
 import click
 from scene_options import choice_options, open_scene
 
-from clvol.cli.options import ExplainedCommand, definitions_option, fail
+from clvol.cli.messages import fail
+from clvol.cli.options import ExplainedCommand, definitions_option
 from clvol.device.programs import stage_source
 from clvol.errors import DeviceError, Error
 from clvol.planning.config import KernelConfig

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import click
-
-from clvol.cli.options import RegistryChoice, device_option
+from clvol.cli.options import device_option, family_options
 from clvol.device.device import Device, open_device
 from clvol.planning.choices import Choices, prepare_for
 from clvol.planning.config import KernelConfig
@@ -49,7 +47,4 @@ def open_scene(
 
 def choice_options(command: Callable) -> Callable:
     """One option for each family of choices in `clvol.planning.registry`, and the device."""
-    command = device_option(command)
-    for family in reversed(FAMILIES):
-        command = click.option(f"--{family}", type=RegistryChoice(family), default="auto")(command)
-    return command
+    return family_options()(device_option(command))

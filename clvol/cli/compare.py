@@ -7,13 +7,12 @@ from typing import Any
 
 import click
 
+from clvol.cli.messages import exit_by, logging_to, mention
 from clvol.cli.options import (
     ExplainedCommand,
-    RegistryChoice,
+    RegistryNames,
     definitions_option,
     device_option,
-    exit_by,
-    mention,
     positive_option,
     quiet_option,
 )
@@ -32,38 +31,22 @@ Examples:
 """
 
 
-class NamesOfFamily(RegistryChoice):
-    """Names of one family, with commas between them."""
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        """In --help."""
-        return "NAME,…"
-
-    def convert(
-        self, value: str | tuple[str, ...], param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[str, ...]:
-        """Known names; OptionError with the known ones if one is not."""
-        from clvol.lab.comparison.names import split_names
-
-        return split_names(self.name, value)
-
-
 class _Command(ExplainedCommand):
     """Remembers its arguments, for the report."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        ctx.meta["clvol.base.arguments"] = list(args)
+        ctx.meta["clvol.arguments"] = list(args)
         return super().parse_args(ctx, args)
 
 
-def family_options(command: Any) -> Any:
+def _names_options(command: Any) -> Any:
     """--techniques or --technique, and the same for every family of the registry."""
-    from clvol.lab.comparison.names import plural
+    from clvol.lab.names import plural
     from clvol.planning.registry import FAMILIES, FAMILY_PURPOSE
 
     for family in reversed(FAMILIES):
         spellings = (f"--{plural(family)}", f"--{family}")
-        kind = NamesOfFamily(family)
+        kind = RegistryNames(family)
         text = FAMILY_PURPOSE[family]
         command = click.option(*spellings, family, type=kind, default="auto", help=text)(command)
     return command
@@ -72,7 +55,7 @@ def family_options(command: Any) -> Any:
 @click.command("compare", cls=_Command, epilog=EXAMPLES)
 @click.argument("scene", metavar="SCENE")
 @click.option("-o", "--output", metavar="FOLDER", required=True, help="Report to write, or to replace.")
-@family_options
+@_names_options
 @positive_option(
     "--time",
     "time_limit",
@@ -123,15 +106,13 @@ def compare(
         raise click.UsageError("give --reference or --reference-spp, not both")
     check_folder(output)
     console = error_console()
-    from clvol.cli.main import _logging_to
-
-    with _logging_to(console, verbose=False):
+    with logging_to(console, verbose=False):
         import clvol
 
         loaded = clvol.load_file(scene, **dict(definitions))
         progress: Any = False if quiet else Bar(console)
         comparison = _run(clvol.compare, loaded, progress, options)
-        arguments = click.get_current_context().meta.get("clvol.base.arguments", [])
+        arguments = click.get_current_context().meta.get("clvol.arguments", [])
         comparison.about["command"] = shlex.join(["clvol", "compare", *arguments])
         write_or_keep(comparison, output)
     if comparison.interrupted:

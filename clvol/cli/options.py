@@ -1,97 +1,15 @@
-"""What clvol's commands share: one-line errors, and option types that read the registry."""
+"""What clvol's commands share: option types that read the registry, and options of several commands."""
 
 from __future__ import annotations
 
-import io
 import math
-import os
-import sys
-from contextlib import suppress
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any
 
 import click
 
-from clvol.base.interrupts import ENDING, interruptible
-from clvol.errors import DeviceError, Error, OptionError, printable, shortened
+from clvol.errors import OptionError
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-USER_ERROR = 2
-LONGEST_LINE = 3000
-"""Characters of an error's line at most, whatever was on the command line."""
 PILOT_HELP = [("auto:pilot", "measures, then picks the technique, transmittance and majorant left at auto")]
-
-
-class OneLineErrors(click.Group):
-    """A command group whose users' mistakes end in one line on standard error and status 2, no traceback."""
-
-    def main(
-        self,
-        args: Sequence[str] | None = None,
-        prog_name: str | None = None,
-        complete_var: str | None = None,
-        standalone_mode: bool = True,
-        **extra: Any,
-    ) -> Any:
-        """Run the command as `click.Group.main` does, and exit; without `standalone_mode`, return."""
-        if not standalone_mode:
-            return super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
-        if isinstance(sys.stdout, io.TextIOWrapper):  # whatever the encoding, a summary is no reason to fail
-            sys.stdout.reconfigure(errors="backslashreplace")
-        with interruptible(ENDING) as interrupt:
-            try:
-                status = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
-            except click.UsageError as error:
-                fail(_usage_message(error))
-            except click.ClickException as error:
-                fail(error.format_message())
-            except DeviceError as error:
-                fail(str(error), whole=True)
-            except Error as error:
-                fail(str(error))
-            except OSError as error:
-                fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
-            except MemoryError as error:
-                fail(f"out of memory: {error}" if str(error) else "out of memory")
-            except click.Abort:
-                mention(["clvol: interrupted"], err=True)
-                sys.exit(interrupt.status)
-            sys.exit(status if isinstance(status, int) else 0)
-
-
-def fail(message: str, whole: bool = False) -> NoReturn:
-    """Print one line on standard error, or the `whole` text (a build log), and exit with status 2."""
-    line = message if whole else printable(shortened(" ".join(message.split()), LONGEST_LINE))
-    mention([f"clvol: error: {line}"], err=True)
-    sys.exit(USER_ERROR)
-
-
-def tell(lines: Iterable[str], err: bool = False) -> None:
-    """Print lines on standard output (or error), whatever names are in them."""
-    single = (line.expandtabs() for text in lines for line in text.split("\n"))
-    click.echo("\n".join(map(printable, single)), err=err)
-
-
-def mention(lines: Iterable[str], err: bool = False) -> None:
-    """As `tell`, where it is no failure if nobody can read it: the terminal was closed, a pipe broke."""
-    try:
-        tell(lines, err)
-    except OSError:
-        with suppress(OSError, ValueError):  # or the interpreter fails on it when it exits
-            os.dup2(os.open(os.devnull, os.O_WRONLY), (sys.stderr if err else sys.stdout).fileno())
-
-
-def exit_by(ended_early: bool) -> NoReturn:
-    """Exit as the signal says that ended the work, or came while it was saved; with 0 if there was none."""
-    with interruptible() as interrupt:
-        sys.exit(interrupt.status if ended_early or interrupt.asked() else 0)
-
-
-def _usage_message(error: click.UsageError) -> str:
-    message = error.format_message().rstrip(".")
-    command = error.ctx.command_path if error.ctx else "clvol"
-    return f"{message[:1].lower()}{message[1:]}; see {command} --help"
 
 
 class RegistryChoice(click.ParamType):
@@ -120,6 +38,22 @@ class RegistryChoice(click.ParamType):
         from clvol.planning.registry import check_choice
 
         return check_choice(self.name, value, self.pilot)
+
+
+class RegistryNames(RegistryChoice):
+    """Several names of one family, with commas between them."""
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        """The list as it stands in --help."""
+        return "NAME,…"
+
+    def convert(
+        self, value: str | tuple[str, ...], param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, ...]:
+        """The names; OptionError where there is none, or one is unknown."""
+        from clvol.lab.names import split_names
+
+        return split_names(self.name, value)
 
 
 class Definition(click.ParamType):
@@ -191,15 +125,20 @@ step_option = positive_option(
 )
 
 
-def choice_options(command: Any) -> Any:
-    """An option for every family of the registry that takes a name of it; "auto" by default."""
+def family_options(*left_out: str, pilot: bool = False) -> Any:
+    """An option for every family of the registry but those left out: a name of it, "auto" by default.
+
+    `pilot`: a technique may be "auto:pilot" too.
+    """
     from clvol.planning.registry import FAMILIES, FAMILY_PURPOSE
 
-    for family in reversed(FAMILIES):
-        text = FAMILY_PURPOSE[family]
-        option = click.option(f"--{family}", type=RegistryChoice(family, True), default="auto", help=text)
-        command = option(command)
-    return command
+    def add(command: Any) -> Any:
+        for family in reversed([family for family in FAMILIES if family not in left_out]):
+            kind, text = RegistryChoice(family, pilot), FAMILY_PURPOSE[family]
+            command = click.option(f"--{family}", type=kind, default="auto", help=text)(command)
+        return command
+
+    return add
 
 
 class ExplainedCommand(click.Command):
@@ -215,16 +154,4 @@ class ExplainedCommand(click.Command):
                     formatter.write_dl(
                         [*automatic, *((name, entry.summary) for name, entry in entries.items())]
                     )
-        super().format_epilog(ctx, formatter)
-
-
-class RenderCommand(ExplainedCommand):
-    """As `ExplainedCommand`, and what the pictures that --aov adds show."""
-
-    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write a section of the pictures before the rest."""
-        from clvol.planning.registry import AOVS
-
-        with formatter.section("--aov"):
-            formatter.write_dl(list(AOVS.items()))
         super().format_epilog(ctx, formatter)

@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from clvol.cli.messages import tell
 from clvol.cli.options import (
     ExplainedCommand,
-    RegistryChoice,
+    RegistryNames,
     definitions_option,
     device_option,
+    family_options,
     majorant_scale_option,
     quiet_option,
     step_option,
-    tell,
 )
 
 if TYPE_CHECKING:
@@ -35,34 +36,6 @@ UNUSED = ("sampler",)
 """Families that decide nothing inside a medium: walks here have independent numbers of their own."""
 
 
-class Names(RegistryChoice):
-    """Several names of one family, with commas between them."""
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        """How the list stands in --help."""
-        return "NAME,…"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The names as a tuple; OptionError where there is none, or one is unknown."""
-        if not isinstance(value, str):
-            return value
-        from clvol.lab.comparison.names import split_names
-
-        return split_names(self.name, value)
-
-
-def _other_families(command: Any) -> Any:
-    """An option for each family that a walk depends on."""
-    from clvol.planning.registry import FAMILIES, FAMILY_PURPOSE
-
-    for family in reversed([f for f in FAMILIES if f not in (*WATCHED, *UNUSED)]):
-        option = click.option(
-            f"--{family}", type=RegistryChoice(family), default="auto", help=FAMILY_PURPOSE[family]
-        )
-        command = option(command)
-    return command
-
-
 @click.command("ray", cls=ExplainedCommand, epilog=EXAMPLES)
 @click.argument("scene", metavar="SCENE")
 @click.argument("x", type=int, metavar="X")
@@ -78,16 +51,16 @@ def _other_families(command: Any) -> Any:
 @click.option(
     "--techniques",
     "--technique",
-    type=Names("technique"),
+    type=RegistryNames("technique"),
     help="How collisions are sampled; three that differ by default.",
 )
 @click.option(
     "--transmittances",
     "--transmittance",
-    type=Names("transmittance"),
+    type=RegistryNames("transmittance"),
     help="How transmittance is estimated; ratio,residual-ratio by default.",
 )
-@_other_families
+@family_options(*WATCHED, *UNUSED)
 @majorant_scale_option
 @step_option
 @click.option("--channel", type=click.Choice(CHANNELS), help="The most attenuated by default.")

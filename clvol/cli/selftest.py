@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from clvol.cli.options import definitions_option, device_option, exit_by, mention, positive_option
+from clvol.cli.messages import exit_by, mention
+from clvol.cli.options import definitions_option, device_option, positive_option
 
 if TYPE_CHECKING:
     from rich.console import Console

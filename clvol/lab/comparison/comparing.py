@@ -17,10 +17,10 @@ from clvol.lab.comparison.bar import Bar
 from clvol.lab.comparison.combine import open_lineup
 from clvol.lab.comparison.figures import compute_figures
 from clvol.lab.comparison.measure import REFERENCE_SAMPLES, Measured, Plan, Told, measure
-from clvol.lab.comparison.names import names_asked
 from clvol.lab.comparison.reference import Reference, read_reference
 from clvol.lab.comparison.result import Comparison
 from clvol.lab.efficiency import LEAST_ROUNDS
+from clvol.lab.names import names_asked
 from clvol.lab.trials import Trial
 from clvol.planning.choices import Choices
 from clvol.rendering.session import MAX_SAMPLES

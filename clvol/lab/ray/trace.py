@@ -12,7 +12,7 @@ import numpy as np
 from clvol.base.arguments import check_seed, whole
 from clvol.device.device import open_device
 from clvol.errors import OptionError, shown
-from clvol.lab.comparison.names import split_names
+from clvol.lab.names import split_names
 from clvol.lab.ray.kernels import RayKernels
 from clvol.lab.ray.place import Place, find_places, pixel_hint
 from clvol.lab.ray.view import RayView

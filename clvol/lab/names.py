@@ -1,4 +1,4 @@
-"""What a user asks to compare: names by family.  Light, for the command line's sake."""
+"""What a user asks to compare or to watch: names by family.  Light, for the command line's sake."""
 
 from __future__ import annotations
 

@@ -1,0 +1,116 @@
+"""What commands tell: results, one-line errors, and clvol's log beside a progress bar."""
+
+from __future__ import annotations
+
+import io
+import logging
+import os
+import sys
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import click
+
+from clvol.base.interrupts import ENDING, interruptible
+from clvol.errors import DeviceError, Error, printable, shortened
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from rich.console import Console
+
+USER_ERROR = 2
+LONGEST_LINE = 3000
+"""Characters of an error's line at most, whatever was on the command line."""
+
+
+class OneLineErrors(click.Group):
+    """A command group whose users' mistakes end in one line on standard error and status 2, no traceback."""
+
+    def main(
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = None,
+        complete_var: str | None = None,
+        standalone_mode: bool = True,
+        **extra: Any,
+    ) -> Any:
+        """Run the command as `click.Group.main` does, and exit; without `standalone_mode`, return."""
+        if not standalone_mode:
+            return super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
+        if isinstance(sys.stdout, io.TextIOWrapper):  # whatever the encoding, a summary is no reason to fail
+            sys.stdout.reconfigure(errors="backslashreplace")
+        with interruptible(ENDING) as interrupt:
+            try:
+                status = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
+            except click.UsageError as error:
+                fail(_usage_message(error))
+            except click.ClickException as error:
+                fail(error.format_message())
+            except DeviceError as error:
+                fail(str(error), whole=True)
+            except Error as error:
+                fail(str(error))
+            except OSError as error:
+                fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
+            except MemoryError as error:
+                fail(f"out of memory: {error}" if str(error) else "out of memory")
+            except click.Abort:
+                mention(["clvol: interrupted"], err=True)
+                sys.exit(interrupt.status)
+            sys.exit(status if isinstance(status, int) else 0)
+
+
+def fail(message: str, whole: bool = False) -> NoReturn:
+    """Print one line on standard error, or the `whole` text (a build log), and exit with status 2."""
+    line = message if whole else printable(shortened(" ".join(message.split()), LONGEST_LINE))
+    mention([f"clvol: error: {line}"], err=True)
+    sys.exit(USER_ERROR)
+
+
+def tell(lines: Iterable[str], err: bool = False) -> None:
+    """Print lines on standard output (or error), whatever names are in them."""
+    single = (line.expandtabs() for text in lines for line in text.split("\n"))
+    click.echo("\n".join(map(printable, single)), err=err)
+
+
+def mention(lines: Iterable[str], err: bool = False) -> None:
+    """As `tell`, where it is no failure if nobody can read it: the terminal was closed, a pipe broke."""
+    try:
+        tell(lines, err)
+    except OSError:
+        with suppress(OSError, ValueError):  # or the interpreter fails on it when it exits
+            os.dup2(os.open(os.devnull, os.O_WRONLY), (sys.stderr if err else sys.stdout).fileno())
+
+
+def exit_by(ended_early: bool) -> NoReturn:
+    """Exit as the signal says that ended the work, or came while it was saved; with 0 if there was none."""
+    with interruptible() as interrupt:
+        sys.exit(interrupt.status if ended_early or interrupt.asked() else 0)
+
+
+def _usage_message(error: click.UsageError) -> str:
+    message = error.format_message().rstrip(".")
+    command = error.ctx.command_path if error.ctx else "clvol"
+    return f"{message[:1].lower()}{message[1:]}; see {command} --help"
+
+
+@contextmanager
+def logging_to(console: Console, verbose: bool) -> Iterator[None]:
+    """Print clvol's log on the console, beside a progress bar too: warnings, and the plan with `verbose`."""
+
+    class ConsoleHandler(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            prefix = f"clvol: {record.levelname.lower()}: " if record.levelno >= logging.WARNING else ""
+            line = printable(prefix + self.format(record))
+            console.print(line, markup=False, highlight=False, emoji=False, soft_wrap=True)
+
+    logger, handler = logging.getLogger("clvol"), ConsoleHandler()
+    earlier = logger.level
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO if verbose else logging.WARNING)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(earlier)

@@ -1,0 +1,197 @@
+"""`clvol render`: a scene into pictures."""
+
+from __future__ import annotations
+
+import os
+from contextlib import nullcontext
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from clvol.cli.messages import exit_by, logging_to, mention
+from clvol.cli.options import (
+    ExplainedCommand,
+    SampleRange,
+    definitions_option,
+    device_option,
+    family_options,
+    finite,
+    majorant_scale_option,
+    positive_option,
+    quiet_option,
+    step_option,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from clvol.picture.result import Result
+
+EXAMPLES = """
+\b
+Examples:
+  clvol render scenes/fire.xml -o fire.exr
+  clvol render scenes/cloud.xml -o cloud.exr -o cloud.png --spp 256
+  clvol render scenes/cloud.xml -o cloud.exr --time 20 -v
+  clvol render scenes/cloud.xml -o cloud.exr -D res=512 --majorant global
+  clvol render scenes/cloud.xml -o cloud.exr --technique decomposition --transmittance residual-ratio
+  clvol render scenes/smoke.xml -o smoke.exr --technique auto:pilot
+  clvol render scenes/cloud.xml -o cloud.exr --target-error 0.01
+  clvol render scenes/fire.xml -o fire.exr --technique weighted-delta --majorant-scale 0.8
+  clvol render scenes/smoke.xml -o smoke.exr --aov cells --aov largest_weight
+"""
+
+
+class RenderCommand(ExplainedCommand):
+    """As `ExplainedCommand`, and what the pictures that --aov adds show."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write a section of the pictures before the rest."""
+        from clvol.planning.registry import AOVS
+
+        with formatter.section("--aov"):
+            formatter.write_dl(list(AOVS.items()))
+        super().format_epilog(ctx, formatter)
+
+
+@click.command(cls=RenderCommand, epilog=EXAMPLES)
+@click.argument("scene", metavar="SCENE")
+@click.option(
+    "-o",
+    "--output",
+    "outputs",
+    metavar="FILE",
+    multiple=True,
+    required=True,
+    help="Picture to write, .exr or .png; may be given several times.",
+)
+@family_options(pilot=True)
+@majorant_scale_option
+@step_option
+@click.option(
+    "--aov",
+    multiple=True,
+    metavar="NAME",
+    help="Add a picture to the .exr, of those below; may be given several times.",
+)
+@click.option("--spp", type=click.IntRange(min=1), help="Samples per pixel; the scene's own by default.")
+@click.option(
+    "--samples",
+    type=SampleRange(),
+    metavar="FIRST,COUNT",
+    help="Only COUNT samples of each pixel, from number FIRST on, instead of the first --spp.",
+)
+@positive_option(
+    "--time",
+    "time_limit",
+    metavar="SECONDS",
+    help="Render for so long instead.",
+)
+@positive_option(
+    "--target-error",
+    metavar="NOISE",
+    help="Render until the mean relative standard error is below NOISE, as 0.01, with samples where "
+    "noise is; --spp or --time then say how long at most.",
+)
+@click.option("--seed", type=click.IntRange(min=0), help="Same seed, same bits; the scene's own by default.")
+@device_option
+@definitions_option
+@click.option(
+    "--exposure",
+    type=float,
+    default=0.0,
+    callback=finite,
+    metavar="STOPS",
+    help="Brighten a .png by so many stops.",
+)
+@click.option("-v", "--verbose", is_flag=True, help="Print features, built units, memory and time by stage.")
+@quiet_option
+def render(
+    scene: str,
+    outputs: tuple[str, ...],
+    spp: int | None,
+    time_limit: float | None,
+    definitions: tuple[tuple[str, str], ...],
+    exposure: float,
+    verbose: bool,
+    quiet: bool,
+    **options: Any,
+) -> None:
+    """Render SCENE, a Mitsuba 3 XML file, into one or more pictures.
+
+    Ctrl-C ends the render early and keeps the picture so far; so do SIGTERM and SIGHUP.
+    """
+    from clvol.base.progress import RichProgress, error_console
+    from clvol.picture.saving import check_disk, check_picture, save_all
+
+    if spp is not None and time_limit is not None:
+        raise click.UsageError("give --spp or --time, not both")
+    for output in outputs:
+        check_picture(output, exposure)
+    if options["aov"] and not any(output.lower().endswith(".exr") for output in outputs):
+        raise click.UsageError("--aov needs an .exr to write to")
+    if exposure and not any(output.lower().endswith(".png") for output in outputs):
+        raise click.UsageError("--exposure needs a .png to write to: an .exr is as bright as the scene")
+    _check_distinct(scene, outputs)
+    console = error_console()
+    with logging_to(console, verbose):
+        import clvol
+
+        loaded = clvol.load_file(scene, **dict(definitions))
+        pixels = loaded.film.window[2] * loaded.film.window[3]
+        for output in outputs:
+            check_disk(output, pixels, len(options["aov"]))
+        piloted = options["technique"] == "auto:pilot"
+        if piloted and not quiet and not console.is_terminal:
+            from clvol.lab.repeat import announcement
+
+            mention([announcement(loaded, options)], err=True)
+        with nullcontext(False) if quiet else RichProgress(console) as progress:
+            result = clvol.render(loaded, spp=spp, time_limit=time_limit, progress=progress, **options)
+        if piloted:
+            from clvol.lab.repeat import with_definitions
+
+            result.metadata["repeat"] = with_definitions(result.metadata["repeat"], dict(definitions))
+        failures = save_all(lambda suffix: result.encode(suffix, exposure), outputs)
+    written = [output for output in outputs if output not in failures]
+    if result.stats["interrupted"]:
+        saved = ", saved what there is" if written else ""
+        mention([f"clvol: interrupted after {result.samples[1]} spp{saved}"], err=True)
+    if not quiet:
+        mention(_summary(result, written))
+    for failure in failures.values():
+        raise failure
+    exit_by(result.stats["interrupted"])
+
+
+def _check_distinct(scene: str, outputs: Sequence[str]) -> None:
+    """Refuse pictures that would replace each other or the scene, whatever the links to them."""
+    names = {os.path.realpath(scene): "the scene"}
+    for output in outputs:
+        place = os.path.realpath(output)
+        if place in names:
+            raise click.UsageError(f"{output}: would replace {names[place]}")
+        names[place] = "another picture"
+
+
+def _summary(result: Result, written: Sequence[str]) -> Iterator[str]:
+    """What was written, what it cost and how sure it is."""
+    from clvol.base.progress import format_noise
+
+    height, width = result.image.shape[:2]
+    about, count = result.metadata, result.samples[1]
+    seconds = about["seconds"]
+    rate = width * height * count / max(seconds, 1e-9)
+    mean = " on the mean" if "target_error" in about else ""
+    yield f"{', '.join(written) or 'not saved'}: {width} x {height} pixels, {count} spp{mean}"
+    yield f"  {seconds:.2f} s, {rate:,.0f} samples/s, noise {format_noise(result.noise)}"
+    choices = ("technique", "transmittance", "majorant", "lookup")
+    used = [f"{key} {about[key]}" for key in choices if about[key] != "none" or key == "transmittance"]
+    lookups = result.stats["lookups"] / max(width * height * count, 1)
+    if used == ["transmittance none"]:
+        yield "  no media"
+    else:
+        yield f"  {', '.join(used)}; {lookups:.4g} look-ups per sample"
+    if "pilot" in about:
+        yield f"  pilot: {about['pilot_reason']}; repeat with"
+        yield f"  {about['repeat']}"
