@@ -1,4 +1,4 @@
-"""Memory that this process may still take, as far as the system tells.
+"""Bytes: how many this process may still take, as far as the system tells, and how people write them.
 
 To ask is worth it before much is taken: systems promise more than there is, and kill whoever uses it.
 """
@@ -7,6 +7,15 @@ from __future__ import annotations
 
 import resource
 from pathlib import Path
+
+
+def format_bytes(count: float) -> str:
+    """Number of bytes as people write it: "512 B", "1.5 MiB"."""
+    for unit in ("B", "KiB", "MiB", "GiB"):
+        if count < 1024 or unit == "GiB":
+            break
+        count /= 1024
+    return f"{count:.4g} {unit}"
 
 
 def available_memory() -> int | None:

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from clvol.base.files import other_kind
+from clvol.base.memory import format_bytes
 from clvol.errors import OptionError
 
 if TYPE_CHECKING:
@@ -58,8 +59,6 @@ def check_room(folder: Path, where: str, size: int = 0) -> None:
             if size:
                 os.posix_fallocate(file.fileno(), 0, size)
     except OSError as error:
-        from clvol.scene.describe import format_bytes
-
         room = f" {format_bytes(size)}" if size else ""
         raise OptionError(
             f"cannot write{room} to '{folder}': {error.strerror}", where, "choose another folder"

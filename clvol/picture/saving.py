@@ -6,6 +6,7 @@ import logging
 import secrets
 from collections.abc import Callable, Sequence
 
+from clvol.base.memory import format_bytes
 from clvol.base.output_files import (
     StrPath,
     check_file,
@@ -42,8 +43,6 @@ def check_disk(path: StrPath, pixels: int, aovs: int) -> None:
         check_room(folder, str(path), most)
     except OptionError:
         check_room(folder, str(path), most // _SQUEEZED)
-        from clvol.scene.describe import format_bytes
-
         log.warning("%s: '%s' has no room for the %s it may take", path, folder, format_bytes(most))
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from clvol.base.memory import format_bytes
 from clvol.scene import records
 from clvol.scene.materials import Bsdf, Dielectric, Mask, Null, TwoSided
 from clvol.volumes import VdbGridInfo, list_vdb, read_vdb, read_volume
@@ -16,15 +17,6 @@ from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-
-def format_bytes(count: float) -> str:
-    """Number of bytes as people write it: "512 B", "1.5 MiB"."""
-    for unit in ("B", "KiB", "MiB", "GiB"):
-        if count < 1024 or unit == "GiB":
-            break
-        count /= 1024
-    return f"{count:.4g} {unit}"
 
 
 def describe_volume(path: str, grid: str | None = None) -> list[str]:
