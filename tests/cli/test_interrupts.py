@@ -17,10 +17,10 @@ from click.testing import CliRunner, Result
 from signals import press_key
 
 import clvol
+from clvol import api
 from clvol.base import interrupts, output_files
 from clvol.base.progress import Progress, RichProgress
 from clvol.cli.main import main
-from clvol.rendering.session import Session
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 SCENE = """<scene version="3.0.0"><sensor type="perspective"><film type="hdrfilm">
@@ -110,7 +110,7 @@ def test_signals_after_the_last_sample_lose_nothing(
         return pressed
 
     if moment == "after the last sample":
-        monkeypatch.setattr(Session, "result", pressed_before(Session.result))
+        monkeypatch.setattr(api, "make_result", pressed_before(api.make_result))
     else:
         monkeypatch.setattr(output_files.os, "replace", pressed_before(os.replace))
     outcome = render(tmp_path, "--spp", "3")
