@@ -16,6 +16,7 @@ from pictures import box, gridded, homogeneous, picture, volume
 import clvol
 from clvol.cli.main import main
 from clvol.errors import OptionError
+from clvol.lab import candidates
 from clvol.lab import pilot as pilots
 from clvol.lab.candidates import Candidate, Relative
 from clvol.lab.combinations import independent_seeds, unbiased
@@ -52,7 +53,7 @@ def test_both_kinds_of_seconds_are_of_the_same_clock(monkeypatch):
     class Session(SimpleNamespace):
         setup_seconds, kernel_seconds, config = 4.0, 3.0, SimpleNamespace()
         image, stats = np.zeros((2, 2, 3)), {"largest_weight": 1.0}
-        restart = result = lambda self, *_: self
+        restart = lambda self, *_: self  # noqa: E731
         run = lambda *_: work(6.0, 50.0)  # noqa: E731
         choices = lambda _: dict.fromkeys(pilots.CHOSEN, "x")  # noqa: E731
 
@@ -62,6 +63,7 @@ def test_both_kinds_of_seconds_are_of_the_same_clock(monkeypatch):
             return cls(device=device)
 
     monkeypatch.setattr(pilots, "Session", Session)
+    monkeypatch.setattr(candidates, "make_result", lambda session, *_: session)
     monkeypatch.setattr(pilots, "prepare_for", lambda *_: work(3.0, 70.0))
     device = SimpleNamespace(is_cpu=True, info=SimpleNamespace(compute_units=2))
     run = pilots.Pilot(
