@@ -1,11 +1,12 @@
-"""The figures of the README's performance section, measured.
+"""The figures of docs/performance.md, measured.
 
     python tools/bench.py cloud --mitsuba /path/to/mitsuba-environment/bin/python
     python tools/bench.py all --json figures.json
 
 Nothing here is a test: figures depend on the machine and on what else runs on it.  So a figure is a median
 with its least and greatest value, and what is compared takes turns.  The exit status is 1 where an aim is
-missed or, of `all`, something could not be measured.  `tools/docs.py performance` writes them into README.
+missed or, of `all`, something could not be measured.  `tools/docs.py performance` writes them into
+docs/performance.md.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ ROWS: dict[str, Callable[[Figures], list[Row]]] = {
     "memory": bench_costs.memory_rows,
     "chromatic": chromatic.chromatic_rows,
 }
-"""README's rows of each command's figures."""
+"""The table's rows of each command's figures."""
 ROUGH: dict[str, dict[str, object]] = {
     "cloud": {"res": 16, "seconds": 0.2, "rounds": 2},
     "room": {"res": 16, "seconds": 0.2, "rounds": 2},
@@ -56,7 +57,7 @@ LEFT_OUT = "left_out"
 
 
 def rows(figures: Figures) -> list[Row]:
-    """Everything that was measured, in README's order."""
+    """Everything that was measured, in the table's order."""
     return [row for name, of in ROWS.items() if name in figures for row in of(figures[name])]
 
 

@@ -35,7 +35,7 @@ class Unavailable(click.ClickException):
 
 @dataclass(frozen=True)
 class Row:
-    """One line of README's performance table: what was measured, how much it is, what it should be.
+    """One line of the performance table: what was measured, how much it is, what it should be.
 
     met : whether it is so; True where nothing is asked.
     """
@@ -78,7 +78,7 @@ def judge(rows: list[Row]) -> int:
 
 
 def markdown(rows: Iterable[Row]) -> list[str]:
-    """The same as lines of README."""
+    """The same as lines of Markdown."""
     lines = ["| figure | measured | aim |", "|---|---|---|"]
     for row in rows:
         lines.append(f"| {row.figure} | {row.measured} | {row.aim}{'' if row.met else ': **missed**'} |")

@@ -1,7 +1,7 @@
-"""Regenerates all figures and pictures of README and docs/: `python tools/docs.py all`, or a part of them.
+"""Regenerates all figures and pictures of docs/: `python tools/docs.py all`, or a part of them.
 
-Pictures and the view of a ray are made by the very commands that README prints, the tables of techniques by
-`clvol.compare`, the pilot's by tools/pilot.py and README's performance table by tools/bench.py.
+Pictures and the view of a ray are made by the very commands that stand beside them in docs/, the tables of
+techniques by `clvol.compare`, the pilot's by tools/pilot.py and the performance table by tools/bench.py.
 """
 
 from __future__ import annotations
@@ -23,32 +23,35 @@ from pilot import SCENES, pilot_options, tested
 
 from clvol.cli.messages import OneLineErrors
 
-DOCS, README = ROOT / "docs", ROOT / "README.md"
+DOCS = ROOT / "docs"
+PERFORMANCE = DOCS / "performance.md"
+PICTURED = ("gallery.md", "ray.md")
+"""Pages whose commands make their pictures."""
 FIRST, LAST = "<!-- performance: written by tools/docs.py -->", "<!-- end of performance -->"
 
 
 def commands() -> dict[str, list[str]]:
-    """README's commands that make pictures of docs/, by the picture's name."""
-    text = README.read_text(encoding="utf-8")
+    """The commands of docs/ that make its pictures, by the picture's name."""
+    text = "\n".join((DOCS / page).read_text(encoding="utf-8") for page in PICTURED)
     found = {}
     for line in re.findall(r"clvol (?:render|ray) scenes/[^`\n]+", text):
         words = shlex.split(line)
         for output in (words[n + 1] for n, word in enumerate(words[:-1]) if word == "-o"):
             name = Path(output).stem
-            if f"(docs/{name}.png)" in text:
+            if f"(pictures/{name}.png)" in text:
                 found[name] = words
     return found
 
 
 def run(words: list[str], name: str) -> None:
-    """One of README's commands, with docs/NAME.png as its output."""
+    """One of these commands, with docs/pictures/NAME.png as its output."""
     kept, rest = [], iter(words[1:])
     for word in rest:
         if word == "-o":
             next(rest)
         else:
             kept.append(word)
-    command = [sys.executable, "-m", "clvol.cli.main", *kept, "-o", f"docs/{name}.png"]
+    command = [sys.executable, "-m", "clvol.cli.main", *kept, "-o", f"docs/pictures/{name}.png"]
     if subprocess.run(command, cwd=ROOT).returncode:
         raise click.ClickException(f"{shlex.join(words)} failed; what it said stands above")
 
@@ -60,7 +63,7 @@ def enclosed(path: Path) -> tuple[str, str]:
 
 @click.group(cls=OneLineErrors)
 def main() -> None:
-    """Regenerate the figures and pictures of README and docs/, or a part of them.
+    """Regenerate the figures and pictures of docs/, or a part of them.
 
     \b
     python tools/docs.py all --mitsuba PYTHON
@@ -83,11 +86,11 @@ def output_option(default: Path) -> Callable[[Callable], Callable]:
 @main.command()
 @click.argument("names", nargs=-1)
 def pictures(names: tuple[str, ...]) -> None:
-    """The pictures that README shows, or only those NAMES, by the commands that stand beside them."""
+    """The pictures of docs/, or only those NAMES, by the commands that stand beside them."""
     known = commands()
     for name in names:
         if name not in known:
-            raise click.BadParameter(f"README has no command that makes {name!r}, but {', '.join(known)}")
+            raise click.BadParameter(f"no page has a command that makes {name!r}, but {', '.join(known)}")
     for name in names or known:
         click.echo(shlex.join(known[name]))
         run(known[name], name)
@@ -121,16 +124,16 @@ def pilot(spp: int, rounds: int, more: int, scenes: tuple[str, ...], device: str
 @main.command()
 @bench.mitsuba_option
 @bench.rough_option
-@output_option(README)
+@output_option(PERFORMANCE)
 @click.pass_context
 def performance(context: click.Context, mitsuba: str | None, rough: bool, output: Path) -> int:
-    """README's performance table, between its markers, from all of tools/bench.py.
+    """The table of performance.md, between its markers, from all of tools/bench.py.
 
     What cannot be measured on a machine, for want of Mitsuba or embreex, is left out of the table, and said
     there and at the end. The exit status is 1 where anything is left out or an aim is missed.
     """
-    if rough and output == README:
-        raise click.UsageError("rough figures are not for README: give --output")
+    if rough and output == PERFORMANCE:
+        raise click.UsageError("rough figures are not for the documentation: give --output")
     enclosed(output)  # told now, not after the measurements
     _, figures = context.invoke(bench.everything, mitsuba=mitsuba, rough=rough)
     before, after = enclosed(output)  # as it is by now
@@ -147,7 +150,7 @@ def everything(context: click.Context, mitsuba: str | None) -> int:
     Figures are of a machine that does nothing else meanwhile. The exit status is 1 where one of the parts
     says so.
     """
-    enclosed(README)
+    enclosed(PERFORMANCE)
     status = 0
     for part, options in ((pictures, {}), (techniques, {}), (pilot, {}), (performance, {"mitsuba": mitsuba})):
         started = time.monotonic()

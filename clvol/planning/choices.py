@@ -94,7 +94,7 @@ DEFAULT_SAMPLER = "sobol"
 
 def resolve(features: Features, asked: Mapping[str, str]) -> dict[str, str]:
     """Every family's choice but the majorant's, which `prepare` weighs by its cost; `auto` follows the rules
-    that README states."""
+    that docs/choices.md states."""
     rules = {
         "technique": _technique(features, asked),
         "transmittance": _transmittance(features),

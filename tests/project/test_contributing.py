@@ -1,5 +1,5 @@
-"""CONTRIBUTING.md's worked example of a technique compiles, is right, and shows right in `clvol ray`; where
-it is too noisy to be judged, the tests of techniques say so."""
+"""The worked example of a technique in docs/contributing.md compiles, is right, and shows so in `clvol ray`;
+where it is too noisy to be judged, the tests of techniques say so."""
 
 import re
 from pathlib import Path
@@ -16,7 +16,7 @@ import clvol
 from clvol.device import programs
 from clvol.planning import registry
 
-TEXT = (Path(__file__).resolve().parents[2] / "CONTRIBUTING.md").read_text(encoding="utf-8")
+TEXT = (Path(__file__).resolve().parents[2] / "docs" / "contributing.md").read_text(encoding="utf-8")
 STEPS = TEXT.split("## Adding a technique")[1].split("\n## ")[0]
 [EXAMPLE] = re.findall(r"```c\n(.*?)```", STEPS, re.DOTALL)
 DOUBLED, DROPPED = "beta *= 2.0f", "beta *= 1.0f"

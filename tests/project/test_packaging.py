@@ -136,7 +136,7 @@ def test_source_distribution_holds_what_its_tests_need(tmp_path: Path) -> None:
     [path] = tmp_path.glob("*.tar.gz")
     with tarfile.open(path) as archive:
         found = {name.partition("/")[2] for name in archive.getnames()}
-    assert {"LICENSE", "CITATION.cff", "README.md", "CHANGELOG.md", "CONTRIBUTING.md"} <= found
+    assert {"LICENSE", "CITATION.cff", "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "mkdocs.yml"} <= found
     for folder in ("clvol", "cl", "scenes", "tests", "tools", "docs"):
         files = [p for p in (ROOT / folder).rglob("*") if p.is_file() and p.suffix != ".pyc"]
         missing = {p.relative_to(ROOT).as_posix() for p in files} - found

@@ -237,27 +237,27 @@ def test_ray_meshes_are_closed_and_of_the_size_asked_for(tool) -> None:
 def test_performance_replaces_what_is_between_the_markers(
     tool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    docs, readme = tool("docs"), tmp_path / "README.md"
+    docs, page = tool("docs"), tmp_path / "performance.md"
     figures = planted() | {"left_out": {"room": "no Mitsuba here"}}
     monkeypatch.setattr(docs.bench.everything, "callback", lambda **_: (None, figures))
-    readme.write_text(f"before\n{docs.FIRST}\n| room | 15 times | of last year |\n{docs.LAST}\nafter\n")
-    outcome = CliRunner().invoke(docs.main, ["performance", "--output", str(readme)])
+    page.write_text(f"before\n{docs.FIRST}\n| room | 15 times | of last year |\n{docs.LAST}\nafter\n")
+    outcome = CliRunner().invoke(docs.main, ["performance", "--output", str(page)])
     assert outcome.exit_code == 1 and "LEFT OUT: room: no Mitsuba here" in outcome.output
-    text = readme.read_text()
+    text = page.read_text()
     assert text.startswith(f"before\n{docs.FIRST}\n") and text.endswith(f"\n{docs.LAST}\nafter\n")
     assert "last year" not in text and "Not measured: `room`, no Mitsuba here." in text
     assert "| 20 (20 to 20) times" in text and "| at least 8 |" in text
-    assert list(tmp_path.iterdir()) == [readme]
+    assert list(tmp_path.iterdir()) == [page]
 
 
 @pytest.mark.parametrize("text", ["no markers", "{last} {first}", "{first} {last} {first} {last}"])
 def test_a_file_without_its_markers_is_refused_before_measuring(
     tool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str
 ) -> None:
-    docs, readme = tool("docs"), tmp_path / "README.md"
+    docs, page = tool("docs"), tmp_path / "performance.md"
     monkeypatch.setattr(docs.bench.everything, "callback", lambda **_: pytest.fail("measured"))
-    readme.write_text(text.format(first=docs.FIRST, last=docs.LAST))
-    outcome = CliRunner().invoke(docs.main, ["performance", "--output", str(readme)])
+    page.write_text(text.format(first=docs.FIRST, last=docs.LAST))
+    outcome = CliRunner().invoke(docs.main, ["performance", "--output", str(page)])
     assert outcome.exit_code == 2 and outcome.output.count("\n") == 1 and docs.FIRST in outcome.output
 
 
@@ -272,7 +272,7 @@ def test_all_runs_every_part_in_order_and_hands_mitsuba_on(tool, monkeypatch: py
     outcome = CliRunner().invoke(docs.main, ["all", "--mitsuba", "their/python"])
     assert outcome.exit_code == 1, outcome.output
     assert [name for name, _ in done] == ["pictures", "techniques", "pilot", "performance"]
-    assert done[-1][1]["mitsuba"] == "their/python" and done[-1][1]["output"].name == "README.md"
+    assert done[-1][1]["mitsuba"] == "their/python" and done[-1][1]["output"] == docs.PERFORMANCE
 
 
 # --- pilot -----------------------------------------------------------------------------------------
