@@ -7,9 +7,6 @@ from pathlib import Path
 
 import pytest
 
-SCENES = Path(__file__).resolve().parent.parent / "scenes"
-
-
 OTHERS = {
     "mitsuba": ("Mitsuba 3.9", "CLVOL_MITSUBA"),
     "openvdb": ("OpenVDB 12", "CLVOL_OPENVDB"),

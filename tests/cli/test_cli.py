@@ -7,13 +7,13 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio  # noqa: N813
 import pytest
 from click.testing import CliRunner, Result
+from places import SCENES
 
 import clvol
 from clvol.base.progress import Progress, RichProgress
@@ -197,10 +197,9 @@ def test_verbose_prints_the_plan_and_quiet_prints_nothing(scene: str, tmp_path: 
 
 
 def test_time_limit_ends_the_render(scene: str, tmp_path: Path) -> None:
-    started = time.monotonic()
+    """Nothing else ends it."""
     outcome = run("render", scene, "-o", tmp_path / "a.exr", "--time", "0.5")
     assert outcome.exit_code == 0, outcome.output
-    assert time.monotonic() - started < 60
     assert oiio.ImageInput.open(str(tmp_path / "a.exr")).spec().get_int_attribute("spp") > 3
 
 
@@ -236,13 +235,12 @@ def test_ctrl_c_ends_a_real_render_and_keeps_the_picture(
 
     def press_once(_bar: RichProgress, _record: Progress) -> None:
         if not presses:
-            presses.append(time.monotonic())
+            presses.append(signal.SIGINT)
             os.kill(os.getpid(), signal.SIGINT)
 
     monkeypatch.setattr(RichProgress, "__call__", press_once)
     outcome = run("render", scene, "-o", tmp_path / "a.exr", "--time", "120")
     assert outcome.exit_code == 130, outcome.output
-    assert time.monotonic() - presses[0] < 60
     assert "interrupted after" in outcome.stderr and "Traceback" not in outcome.stderr
     assert oiio.ImageInput.open(str(tmp_path / "a.exr")).spec().get_int_attribute("spp") >= 1
 
@@ -298,7 +296,7 @@ def test_info_describes_a_scene(scene: str) -> None:
 
 
 def test_info_describes_a_dense_volume() -> None:
-    cloud = Path(__file__).resolve().parents[2] / "scenes" / "cloud.vol"
+    cloud = SCENES / "cloud.vol"
     outcome = run("info", cloud)
     assert outcome.exit_code == 0, outcome.output
     for text in ("128 x 128 x 128 samples, 1 channel", "(0, 0, 0) to (1, 1, 1)", "0 to 1", "8 MiB"):
@@ -306,7 +304,7 @@ def test_info_describes_a_dense_volume() -> None:
 
 
 def test_info_describes_every_grid_of_a_vdb() -> None:
-    fire = Path(__file__).resolve().parents[2] / "scenes" / "fire.vdb"
+    fire = SCENES / "fire.vdb"
     outcome = run("info", fire)
     assert outcome.exit_code == 0, outcome.output
     for text in ("density: ", "(5, 3, 7) to (75, 74, 125)", "290,395 voxels", "flame: ", "temperature: "):

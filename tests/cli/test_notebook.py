@@ -3,16 +3,14 @@
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio  # noqa: N813
+from places import ROOT
 
 from clvol.picture.estimate import Moments
 from clvol.picture.image_io import tone_map
 from clvol.picture.result import Result
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_a_result_shows_itself_as_a_tone_mapped_png(tmp_path):

@@ -2,21 +2,21 @@
 where it is too noisy to be judged, the tests of techniques say so."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 from fields import FIELDS, RAYS, exit_distance
+from places import ROOT
 from probe import Probe, medium_of, scene_of
+from slabs import assert_a_white_slab_loses_nothing
 from stat_tests import TooNoisyError, largest_z
-from test_techniques import test_a_white_slab_loses_nothing as white_slab
 from walks import assert_weighted_collisions, exact_depth, sample_walks, scene_with
 
 import clvol
 from clvol.device import programs
 from clvol.planning import registry
 
-TEXT = (Path(__file__).resolve().parents[2] / "docs" / "contributing.md").read_text(encoding="utf-8")
+TEXT = (ROOT / "docs" / "contributing.md").read_text(encoding="utf-8")
 STEPS = TEXT.split("## Adding a technique")[1].split("\n## ")[0]
 [EXAMPLE] = re.findall(r"```c\n(.*?)```", STEPS, re.DOTALL)
 DOUBLED, DROPPED = "beta *= 2.0f", "beta *= 1.0f"
@@ -59,7 +59,7 @@ def test_the_example_is_too_noisy_to_tell_in_a_medium_of_loose_bounds(device, re
     with pytest.raises(TooNoisyError, match="sparse: too noisy to tell right from wrong"):
         check(device, register(), "sparse")
     with pytest.raises(TooNoisyError, match="R and T: too noisy"):
-        white_slab(register(), "residual-ratio")
+        assert_a_white_slab_loses_nothing(register(), "residual-ratio")
 
 
 def test_a_mistake_in_it_is_wrong_and_not_noise(device, register):

@@ -8,11 +8,11 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from places import ROOT, SCENES
 
 from clvol.planning.registry import AOVS, FAMILIES
 from clvol.scene.loader import PLUGINS
 
-ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 PAGES = sorted([*DOCS.glob("*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md"])
 PLUGIN_NAMES = sorted({name for plugins in PLUGINS.values() for name in plugins} - {"scene"})
@@ -108,7 +108,7 @@ def test_the_table_lists_every_aov(aov: str) -> None:
 
 def test_the_first_examples_run_in_turn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     examples = re.findall(r"```python\n(.*?)```", text_of("getting-started.md"), re.DOTALL)
-    (tmp_path / "scenes").symlink_to(ROOT / "scenes", target_is_directory=True)
+    (tmp_path / "scenes").symlink_to(SCENES, target_is_directory=True)
     monkeypatch.chdir(tmp_path)
     exec("\n".join(examples), {})
     assert (tmp_path / "cloud.exr").stat().st_size > 10000
@@ -116,7 +116,7 @@ def test_the_first_examples_run_in_turn(tmp_path: Path, monkeypatch: pytest.Monk
 
 def test_every_scene_and_the_command_of_every_picture_stand_in_the_gallery() -> None:
     gallery = text_of("gallery.md")
-    for scene in (ROOT / "scenes").glob("*.xml"):
+    for scene in (SCENES).glob("*.xml"):
         assert scene.name in gallery
     for picture in re.findall(r"!\[[^\]]+\]\(([^)]+)\)", gallery):
         assert (DOCS / picture).is_file()

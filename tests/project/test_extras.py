@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from places import SCENES
 
-ROOT = Path(__file__).resolve().parents[2]
 WITHOUT = """
 import sys
 sys.modules["matplotlib"] = None  # as where it is not installed: any import of it is an ImportError
@@ -24,7 +24,7 @@ def clvol_without_matplotlib(folder: Path, *arguments: str) -> subprocess.Comple
 
 
 def test_renders_need_no_matplotlib(tmp_path: Path) -> None:
-    scene = str(ROOT / "scenes" / "slab.xml")
+    scene = str(SCENES / "slab.xml")
     done = clvol_without_matplotlib(
         tmp_path, "render", scene, "-D", "res=8", "--spp", "1", "-o", "a.exr", "-o", "a.png"
     )
@@ -44,7 +44,7 @@ def test_renders_need_no_matplotlib(tmp_path: Path) -> None:
 def test_reports_say_what_to_install_before_anything_is_rendered(
     tmp_path: Path, arguments: tuple[str, ...]
 ) -> None:
-    scene = str(ROOT / "scenes" / "slab.xml")
+    scene = str(SCENES / "slab.xml")
     done = clvol_without_matplotlib(tmp_path, *(word.format(scene=scene) for word in arguments))
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1, done.stderr
@@ -53,7 +53,7 @@ def test_reports_say_what_to_install_before_anything_is_rendered(
 
 
 def test_the_numbers_along_a_ray_need_no_matplotlib(tmp_path: Path) -> None:
-    scene = str(ROOT / "scenes" / "slab.xml")
+    scene = str(SCENES / "slab.xml")
     done = clvol_without_matplotlib(
         tmp_path, "ray", scene, "4", "4", "-D", "res=8", "--techniques", "delta", "-o", "ray.json"
     )

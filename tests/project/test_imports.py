@@ -11,8 +11,9 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
+from places import ROOT
 
-CLVOL = Path(__file__).resolve().parents[2] / "clvol"
+CLVOL = ROOT / "clvol"
 
 
 def modules_in(package: Path) -> dict[str, Path]:

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from places import ROOT, SCENES
 
-ROOT = Path(__file__).resolve().parents[2]
-CLOUD = ROOT / "scenes" / "cloud.vol"
+CLOUD = SCENES / "cloud.vol"
 
 
 @pytest.fixture(scope="module")

@@ -11,10 +11,10 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from places import ROOT
 
 from clvol.version import __version__
 
-ROOT = Path(__file__).resolve().parents[2]
 COMPOSE = """
 import site, sys
 site.addsitedir(sys.argv[1])  # as site-packages, so that .pth files count

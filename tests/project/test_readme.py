@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 
 import pytest
+from places import ROOT, SCENES
 
-ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
@@ -25,7 +25,7 @@ def test_the_two_commands_stand_at_the_top_with_the_picture() -> None:
 
 def test_the_example_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     [example] = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
-    (tmp_path / "scenes").symlink_to(ROOT / "scenes", target_is_directory=True)
+    (tmp_path / "scenes").symlink_to(SCENES, target_is_directory=True)
     monkeypatch.chdir(tmp_path)
     exec(example, {})
     assert (tmp_path / "cloud.exr").stat().st_size > 10000

@@ -14,8 +14,9 @@ from typing import Any
 import click
 import numpy as np
 import pytest
-import test_pilot
 from click.testing import CliRunner
+from made_up_pilot import made_up
+from places import SCENES, TOOLS
 
 import clvol
 from clvol.lab.candidates import Candidate, Relative
@@ -24,9 +25,7 @@ from clvol.planning.choices import Choices
 from clvol.scene.mesh import mesh_flaws
 from clvol.scene.records import GridVolume, Mesh
 
-ROOT = Path(__file__).resolve().parents[2]
-TOOLS = ROOT / "tools"
-CLOUD = str(ROOT / "scenes" / "cloud.xml")
+CLOUD = str(SCENES / "cloud.xml")
 
 
 @pytest.fixture
@@ -304,12 +303,12 @@ def test_a_choice_too_far_from_the_best_is_told_and_the_exit_status(
 def test_a_joint_optimum_that_the_search_missed_is_found(tool) -> None:
     """One combination of those drawn is planted ten times as efficient as what its choices promise."""
     pilot = tool("pilot")
-    found, run = test_pilot.made_up(Choices())
+    found, run = made_up(Choices())
     met = list(run.candidates)
     added = pilot.unmet(run, 5)
     labels = [candidate.label for candidate in run.candidates]
     assert len(added) == 5 and len(set(labels)) == len(labels) == len(met) + 5
-    _, again = test_pilot.made_up(Choices())
+    _, again = made_up(Choices())
     assert [c.label for c in pilot.unmet(again, 5)] == [c.label for c in added]
     chosen = next(c for c in met if pilot.is_of(c, found.names))
     missed = next(c for c in added if len(c.images) > 1)
@@ -330,7 +329,7 @@ def test_a_joint_optimum_that_the_search_missed_is_found(tool) -> None:
 
 def test_the_plume_is_the_committed_one_and_empty_at_its_border(tool) -> None:
     plume = tool("make_scenes").make_plume()
-    committed = np.frombuffer((ROOT / "scenes" / "plume.vol").read_bytes(), "<f4", offset=48)
+    committed = np.frombuffer((SCENES / "plume.vol").read_bytes(), "<f4", offset=48)
     np.testing.assert_allclose(committed.reshape(plume.shape), plume, atol=1.01 / 255)  # sines may differ
     inner = plume.copy()
     inner[1:-1, 1:-1, 1:-1] = 0
@@ -339,6 +338,6 @@ def test_the_plume_is_the_committed_one_and_empty_at_its_border(tool) -> None:
 
 def test_the_knot_is_the_committed_one_and_a_closed_outward_surface(tool) -> None:
     vertices, normals, faces = tool("make_scenes").make_knot()
-    mesh = clvol.load_file(ROOT / "scenes" / "jade.xml").shapes[-1].mesh
+    mesh = clvol.load_file(SCENES / "jade.xml").shapes[-1].mesh
     np.testing.assert_allclose(mesh.vertices, vertices, atol=1e-5)
     assert not mesh_flaws(Mesh(vertices, faces, normals))

@@ -11,13 +11,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from places import SCENES
 
 import clvol
 from clvol.errors import Error, VolumeError
 from clvol.volumes import files, list_vdb, read_numpy, read_vdb, read_vol, read_volume, write_vol
 from clvol.volumes.vdb_stream import WINDOW, open_vdb
 
-FIRE = Path(__file__).resolve().parents[2] / "scenes" / "fire.vdb"
+FIRE = SCENES / "fire.vdb"
 BOX = np.array([[0.0, 0, 0], [1, 1, 1]])
 SIZE = 32
 NOISE = np.random.default_rng(0).random((SIZE,) * 3, np.float32)

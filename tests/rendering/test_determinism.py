@@ -3,61 +3,30 @@
 Nothing here is statistical but the last test, whose false-alarm rate is 1e-4.
 """
 
-import hashlib
 import os
 import signal
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from every_bit import SPP, digest, rendered, scene
 from OpenImageIO import ImageInput
-from pictures import ball, box, gridded, hg, homogeneous, picture, volume
+from pictures import ball, box, homogeneous, picture
+from places import SCENES
 from signals import press_key
 from stat_tests import assert_same_picture
 
 import clvol
 from clvol.rendering import session
-from clvol.scene.records import ConstantEmitter, DirectionalEmitter
-
-SPP = 1300
-"""With 8 x 8 pixels a pass holds 512 samples of each: two passes and a rest (more on a GPU, less often)."""
-
-
-def scene():
-    """Overlapping media, one of them a grid, and two kinds of light."""
-    values = np.random.default_rng(3).uniform(0, 1, (7, 6, 5)) ** 3
-    cube = (0, 0, 0), (1, 1, 1)
-    return picture(
-        [
-            box(*cube, gridded(volume(values, *cube, "nearest"), 0.9, hg(0.6), scale=12.0)),
-            box((0.5, 0.2, 0.1), (1.3, 0.9, 0.8), homogeneous(1.5, 0.9, hg(0.3))),
-        ],
-        [ConstantEmitter((0.8,)), DirectionalEmitter((2.0,), (0.0, -1.0, 0.0))],
-        (0.5, 0.6, -2.0),
-        (0.6, 0.5, 0.5),
-        20.0,
-        (8, 8),
-    )
+from clvol.scene.records import ConstantEmitter
 
 
 def absorbing_scene():
     """A ball before a cube under a light of 1, without scattering."""
     shapes = [box((-2, -2, 1.5), (2, 2, 2.5), homogeneous(0.5)), ball((0, 0, 0), 1.0, homogeneous(0.7))]
     return picture(shapes, [ConstantEmitter()], (0, 0, -4), (0, 0, 0), 20.0, (8, 8))
-
-
-def rendered(described, **options):
-    """With the sampler that users get."""
-    return clvol.render(described, sampler="sobol", **options)
-
-
-def digest(result):
-    """Hash of every bit a render answers for."""
-    arrays = (result.image, result.variance, result.estimate.sums, result.aovs["lookups"])
-    return hashlib.sha256(b"".join(np.ascontiguousarray(a).tobytes() for a in arrays)).hexdigest()
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +71,7 @@ def test_the_pool_size_does_not_touch_a_bit(whole, pool):
 THREAD_SCRIPT = """
 import sys
 sys.path[:0] = sys.argv[1:]
-from test_determinism import SPP, digest, rendered, scene
+from every_bit import SPP, digest, rendered, scene
 from clvol.rendering import session
 result = rendered(scene(), spp=SPP, seed=7)
 print(digest(result), result.metadata["device"], sep="|")
@@ -123,7 +92,7 @@ def test_one_and_two_threads_give_the_same_bits(whole):
 
 def test_sobol_is_what_users_get(tmp_path):
     """In a process of its own: the tests' default is another (conftest.py)."""
-    scene, saved = Path(__file__).resolve().parents[2] / "scenes" / "slab.xml", tmp_path / "a.exr"
+    scene, saved = SCENES / "slab.xml", tmp_path / "a.exr"
     options = ["-o", str(saved), "--spp", "1", "-D", "res=8"]
     command = [sys.executable, "-m", "clvol.cli.main", "render", str(scene), *options]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from places import CASES, SCENES
 from vdb_writer import GridSpec, write_vdb
 
 import clvol
@@ -15,8 +14,7 @@ from clvol.errors import printable
 from clvol.scene.describe import active_statistics, describe_volume
 from clvol.volumes import read_vdb
 
-ROOT = Path(__file__).resolve().parents[2]
-CASES = ROOT / "tests" / "cases" / "vdb"
+FILES = CASES / "vdb"
 
 
 def info(*arguments) -> str:
@@ -34,7 +32,7 @@ def refused(*arguments) -> str:
 
 
 def test_nan_voxels_are_counted_and_the_rest_described():
-    said = info(CASES / "nan.vdb")
+    said = info(FILES / "nan.vdb")
     assert "values   0.1 to 1.098597, background 0; 1 NaN of 756\n" in said
     assert "sum      456.0298 of the others" in said
 
@@ -58,7 +56,7 @@ def test_a_tile_counts_with_all_its_samples(tmp_path):
 
 
 def test_an_empty_grid_says_that_it_has_no_active_voxels():
-    said = info(CASES / "empty.vdb")
+    said = info(FILES / "empty.vdb")
     assert said.startswith("density: sparse, no active voxels, background 0: there is nothing to render\n")
     assert "nan" not in said.lower()
     assert "stored   float" in said
@@ -69,7 +67,10 @@ def test_rendering_an_empty_grid_is_rendering_nothing(caplog):
         "type": "scene",
         "camera": {"type": "perspective", "film": {"type": "hdrfilm", "width": 4, "height": 4}},
     }
-    smoke = {"type": "heterogeneous", "sigma_t": {"type": "vdbvolume", "filename": str(CASES / "empty.vdb")}}
+    smoke = {
+        "type": "heterogeneous",
+        "sigma_t": {"type": "vdbvolume", "filename": str(FILES / "empty.vdb")},
+    }
     cube = {
         "type": "cube",
         "to_world": clvol.translate([0, 0, 4]),
@@ -82,12 +83,12 @@ def test_rendering_an_empty_grid_is_rendering_nothing(caplog):
 
 
 def test_a_file_without_grids_says_so():
-    assert "it has no grids" in info(CASES / "no_grids.vdb")
-    assert "it has no grids" in refused("info", CASES / "no_grids.vdb", "--grid", "density")
+    assert "it has no grids" in info(FILES / "no_grids.vdb")
+    assert "it has no grids" in refused("info", FILES / "no_grids.vdb", "--grid", "density")
 
 
 def test_grids_that_cannot_be_rendered_say_why(tmp_path):
-    said = info(CASES / "bool.vdb")
+    said = info(FILES / "bool.vdb")
     assert said.startswith("density: cannot be rendered, its values are bool: those of float, double,")
     frustum = ("NonlinearFrustumMap", [1.0] * 30)
     grids = [GridSpec(name="v", grid_type="Tree_vec3s_5_4_3"), GridSpec(name="f", transform=frustum)]
@@ -98,18 +99,18 @@ def test_grids_that_cannot_be_rendered_say_why(tmp_path):
 
 
 def test_grids_of_one_name_have_their_own_facts():
-    said = info(CASES / "same_name.vdb")
+    said = info(FILES / "same_name.vdb")
     first, second = said.split("density[1]: sparse")
     assert first.startswith("density: sparse")
     assert ("(-5, 3, -20) to (6, 11, -14) (index)" in first, "sum      445.3056" in first) == (True, True)
     assert "(10, 3, -20) to (21, 11, -14) (index)" in second
     assert "sum      890.6112" in second
     assert "445.3056" not in second
-    assert info(CASES / "same_name.vdb", "--grid", "density[1]").splitlines()[1:] == second.splitlines()[1:-1]
+    assert info(FILES / "same_name.vdb", "--grid", "density[1]").splitlines()[1:] == second.splitlines()[1:-1]
 
 
 def test_an_instance_names_the_grid_whose_tree_it_shares():
-    said = info(CASES / "instances.vdb")
+    said = info(FILES / "instances.vdb")
     temperature = said[said.index("temperature:") :]
     assert "(-10, 6, -40) to (12, 22, -28) (world)" in temperature
     assert "shared   its tree is that of density" in temperature
@@ -164,14 +165,12 @@ def test_printable_keeps_words_of_any_language():
 
 
 def test_options_that_do_not_fit_the_file_are_refused():
-    assert "--grid chooses from a volume file" in refused(
-        "info", ROOT / "scenes/fire.xml", "--grid", "density"
-    )
+    assert "--grid chooses from a volume file" in refused("info", SCENES / "fire.xml", "--grid", "density")
     for name in ("fire.vdb", "cloud.vol"):
-        assert "-D fills a scene's $NAMES" in refused("info", ROOT / "scenes" / name, "-D", "res=3")
-    assert "no grid named 'density'" in refused("info", ROOT / "scenes/cloud.vol", "--grid", "density")
+        assert "-D fills a scene's $NAMES" in refused("info", SCENES / name, "-D", "res=3")
+    assert "no grid named 'density'" in refused("info", SCENES / "cloud.vol", "--grid", "density")
 
 
 def test_describe_volume_reads_each_grid_once_by_its_place():
-    lines = describe_volume(str(CASES / "same_name.vdb"))
+    lines = describe_volume(str(FILES / "same_name.vdb"))
     assert sum(line.startswith("density") for line in lines) == 2

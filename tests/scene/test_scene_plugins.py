@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio  # noqa: N813
 import pytest
+from places import SCENES
 
 from clvol.errors import Error, SceneError, VolumeError
 from clvol.scene import load_dict, load_file, rotate, scale, translate
@@ -17,7 +18,6 @@ from clvol.scene.records import ConstantEmitter, ConstVolume, Film, Integrator, 
 from clvol.volumes import SparseGrid, write_vol
 
 DATA = Path(os.environ.get("CLVOL_DATA", "no such folder"))
-SCENES = Path(__file__).parents[2] / "scenes"
 
 
 def load(camera=None, **plugins):

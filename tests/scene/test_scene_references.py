@@ -1,10 +1,10 @@
 """Ids, references and aliases; what stands in a scene and belongs to nothing; files and texts without end."""
 
 import logging
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import CASES
 
 import clvol
 from clvol.errors import LONGEST, SceneError
@@ -12,7 +12,6 @@ from clvol.scene import load_dict, load_file, vocabulary
 from clvol.scene.nodes import Node
 from clvol.scene.records import Shape
 
-CASES = Path(__file__).parents[1] / "cases"
 SENSOR = '<sensor type="perspective"><float name="fov" value="40"/></sensor>'
 CUBE = '<shape type="cube"><ref id="b"/></shape>'
 DIFFUSE = '<bsdf type="diffuse" id="a"/>'

@@ -3,12 +3,12 @@
 import functools
 import logging
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 from pictures import assert_matches, ball, box, homogeneous, picture
+from places import CASES
 from stat_tests import assert_same_picture
 from surface_scenes import icosphere, mesh_box, meshed, solid_grid, surfaced
 
@@ -22,7 +22,7 @@ from clvol.scene.records import ConstantEmitter, DirectionalEmitter, PointEmitte
 from clvol.tables.camera_medium import starts_inside
 from clvol.tables.prepare import prepare
 
-CASE = Path(__file__).parents[1] / "cases" / "sensor_medium.xml"
+CASE = CASES / "sensor_medium.xml"
 LAMP = PointEmitter((10.0,), (0.0, 1.0, 2.0))
 FLOOR = Shape("rectangle", np.eye(4), bsdf=Diffuse((0.5,)))
 FOG = homogeneous(0.3, 0.5)

@@ -8,19 +8,17 @@ an environment of its own, unless CLVOL_MITSUBA names a Python that has it.
 import importlib
 import os
 import re
-from pathlib import Path
 
 import mitsuba_scenes
 import numpy as np
 import pytest
+from places import SCENES, TOOLS
 from scipy import stats
 from stat_tests import FALSE_ALARM, image_mean, sidak, tile_means
 
 import clvol
 from clvol.scene.loader import PLUGINS
 
-ROOT = Path(__file__).resolve().parents[2]
-TOOLS = ROOT / "tools"
 RUNS = 32
 """Independent renders of Mitsuba, whose scatter is the variance of their mean; few would cost power, as
 Student's t has long tails where degrees of freedom are few."""
@@ -47,9 +45,9 @@ PICTURES = {
     "passages, depth 3": ("passages", {"depth": 3}, 16, 512),
     "fog, depth 3": ("fog", {"depth": 3}, 96, 4096),
     "passages, hidden": ("passages", {"hide": "true", "depth": 5}, 32, 1024),
-    "smoke in a room": (ROOT / "scenes/room", {"res": 24}, 192, 4096),
-    "shafts of light": (ROOT / "scenes/shaft", {"width": 32, "height": 24}, 192, 4096),
-    "jade": (ROOT / "scenes/jade", {"width": 32, "height": 24}, 64, 2048),
+    "smoke in a room": (SCENES / "room", {"res": 24}, 192, 4096),
+    "shafts of light": (SCENES / "shaft", {"width": 32, "height": 24}, 192, 4096),
+    "jade": (SCENES / "jade", {"width": 32, "height": 24}, 64, 2048),
     "lamps, hidden": ("lamps", {"hide": "true", "integrator": "volpath"}, 160, 8192),
 }
 

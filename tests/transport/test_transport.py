@@ -27,10 +27,11 @@ from pictures import (
     unit,
     volume,
 )
+from slabs import HALF_SPACES, SLABS, homogeneous_slab
 from stat_tests import assert_same_picture
 
 from clvol import render
-from clvol.scene.records import ConstantEmitter, DirectionalEmitter, EnvmapEmitter, PointEmitter
+from clvol.scene.records import ConstantEmitter, DirectionalEmitter, PointEmitter
 
 RGB = np.array([0.7, 1.0, 1.6])
 
@@ -100,33 +101,12 @@ def test_a_furnace_of_albedo_a_little_below_one_is_noticed():
 
 # -- published slabs ---------------------------------------------------------------------------------
 
-SLABS = [  # albedo, g, optical thickness, R, T: van de Hulst 1980 (the last R by adding-doubling)
-    (0.9, 0.75, 2.0, 0.09739, 0.66096),
-    (1.0, 0.0, 1.0, 0.34133, 0.65867),
-    (1.0, 0.5, 1.0, 0.17611, 0.82389),
-    (0.9, 0.5, 1.0, 0.12979, 0.73909),
-]
-SLAB_EDGE = 1e4
-
-
-def slab_scene(albedo, g, thickness, **integrator):
-    """Looks down at a wide slab of sigma_t 1 under red light from above and green light from below."""
-    lower, upper = (-SLAB_EDGE / 2, 0, -SLAB_EDGE / 2), (SLAB_EDGE / 2, thickness, SLAB_EDGE / 2)
-    medium = homogeneous(1.0, albedo, hg(g))
-    radiance = np.zeros((512, 8, 3), np.float32)
-    radiance[:256, :, 0] = radiance[256:, :, 1] = 1
-    eye = (0.1, thickness + 1, 0.2)
-    sky = EnvmapEmitter(radiance, np.eye(4))
-    return picture(
-        [box(lower, upper, medium)], [sky], eye, (0.1, 0, 0.2), 0.01, (2, 2), up=(0, 0, 1), **integrator
-    )
-
 
 @pytest.mark.parametrize("albedo, g, thickness, reflected, transmitted", SLABS)
 def test_slabs_reflect_and_transmit_what_is_published(albedo, g, thickness, reflected, transmitted):
     """Homogeneous (test_techniques.py has grids), within 3 standard errors of at most 0.0005: each of the 8
     comparisons fails one seed in 370."""
-    result = render(slab_scene(albedo, g, thickness), spp=1 << 18, seed=4)
+    result = render(homogeneous_slab(albedo, g, thickness), spp=1 << 18, seed=4)
     (r, t, _), error = mean_and_error(result)
     assert error[:2].max() <= 0.0005
     assert abs(r - reflected) < 3 * error[0], f"R = {r:.5f} ± {error[0]:.5f}, not {reflected}"
@@ -134,16 +114,16 @@ def test_slabs_reflect_and_transmit_what_is_published(albedo, g, thickness, refl
 
 
 def test_an_isotropic_slab_is_told_from_a_slightly_forward_scattering_one():
-    (r, t, _), error = mean_and_error(render(slab_scene(1.0, 0.03, 1.0), spp=1 << 17, seed=4))
+    (r, t, _), error = mean_and_error(render(homogeneous_slab(1.0, 0.03, 1.0), spp=1 << 17, seed=4))
     assert abs(r - SLABS[1][3]) > 6 * error[0] and abs(t - SLABS[1][4]) > 6 * error[1]
 
 
 def test_roulette_from_the_first_bounce_keeps_the_albedo_of_a_half_space():
-    """Chandrasekhar's isotropic half-space of albedo 0.99 reflects 0.752721 of normal light."""
-    scene = slab_scene(0.99, 0.0, 200.0, rr_depth=0)
+    """Chandrasekhar's isotropic half-space of albedo 0.99."""
+    scene = homogeneous_slab(0.99, 0.0, 200.0, rr_depth=0)
     (r, t, _), error = mean_and_error(render(scene, spp=1 << 15, seed=5))
     assert t < 1e-5  # seen at the horizon, where the rows of the sky are interpolated
-    assert abs(r - 0.752721) < 3.9 * error[0]  # false-alarm rate 1e-4
+    assert abs(r - HALF_SPACES[0.99]) < 3.9 * error[0]  # false-alarm rate 1e-4
     assert 6 * error[0] < 0.01 * r
 
 

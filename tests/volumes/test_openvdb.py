@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import openvdb_worker
 import pytest
-from test_vdb import STORED_TYPES, rich_grid
+from rich_vdb import STORED_TYPES, rich_grid
 from vdb_writer import ACTIVE_MASK, BLOSC, ZIP, write_vdb
 from volume_samples import probe
 

@@ -16,6 +16,7 @@ from pathlib import Path
 import blosc
 import numpy as np
 import pytest
+from places import SCENES
 from vdb_writer import ACTIVE_MASK, BLOSC, MAGIC, ZIP, GridSpec, write_vdb
 
 from clvol.errors import VolumeError
@@ -23,7 +24,7 @@ from clvol.volumes import check_coefficients, list_vdb, read_vdb
 from clvol.volumes.vdb import find_grid
 from clvol.volumes.vdb_stream import VdbStream, decompress_blosc, decompress_zip, open_vdb
 
-FIRE = Path(__file__).resolve().parents[2] / "scenes" / "fire.vdb"
+FIRE = SCENES / "fire.vdb"
 DATA = os.environ.get("CLVOL_DATA")
 needs_data = pytest.mark.skipif(not DATA, reason="CLVOL_DATA does not name the folder of test data")
 REAL_FILES = [
@@ -127,7 +128,7 @@ print(refused)
 
 
 def test_20000_damaged_blosc_chunks_do_not_crash_the_c_library():
-    root = Path(__file__).resolve().parents[2]
+    root = ROOT
     run = subprocess.run(
         [sys.executable, "-c", FUZZ_BLOSC], cwd=root, capture_output=True, text=True, timeout=120, check=False
     )

@@ -7,18 +7,18 @@ from __future__ import annotations
 
 import logging
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import CASES
 from vdb_writer import GridSpec, write_vdb
 
 import clvol
 from clvol.errors import VolumeError
 from clvol.volumes import list_vdb, read_vdb, read_volume
 
-CASES = Path(__file__).resolve().parents[1] / "cases" / "vdb"
-SAME_NAME, INSTANCES = CASES / "same_name.vdb", CASES / "instances.vdb"
+FILES = CASES / "vdb"
+SAME_NAME, INSTANCES = FILES / "same_name.vdb", FILES / "instances.vdb"
 BOXES = {"density": [[-5, 3, -20], [6, 11, -14]], "density[1]": [[10, 3, -20], [21, 11, -14]]}
 SUMS = {"density": 445.31, "density[1]": 890.61}
 
