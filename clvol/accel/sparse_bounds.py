@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from clvol.accel.bounds import Bounds, slackened
-from clvol.volumes.brick_samples import BOUND_CELLS, BRICK_CELLS
+from clvol.volumes.brick_samples import BOUND_CELLS
+from clvol.volumes.sparse_places import BRICK_CELLS
 from clvol.volumes.tree import (
     NODE_EDGE,
     Tier,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import operator
 from numbers import Real
+from typing import Any, cast
 
 from clvol.errors import OptionError, shown
 
@@ -16,12 +17,13 @@ def positive(name: str, value: object, unit: str = "") -> float:
 
     `name` is what stands before the value, as in "step=" or "time limit ".
     """
-    if isinstance(value, bool) or not isinstance(value, Real) or not 0 < value < math.inf:
+    number = cast("float", value)  # or another real number, as NumPy's are
+    if isinstance(value, bool) or not isinstance(value, Real) or not 0 < number < math.inf:
         raise OptionError(f"{name}{shown(value)} is not a positive number{unit}")
-    return value
+    return number
 
 
-def whole(name: str, value: object) -> int:
+def whole(name: str, value: Any) -> int:
     """`value` if it is an integer of any kind; OptionError otherwise."""
     try:
         return operator.index(value)
@@ -29,7 +31,7 @@ def whole(name: str, value: object) -> int:
         raise OptionError(f"{name}={shown(value)} is not a whole number") from None
 
 
-def check_seed(seed: object) -> int:
+def check_seed(seed: Any) -> int:
     """`seed` if it is a 64-bit number; OptionError otherwise."""
     try:
         number = operator.index(seed)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import stat
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from io import BufferedReader
 
     from clvol.errors import Error
 
@@ -36,7 +37,7 @@ def _kind(mode: int) -> str:
 
 
 @contextmanager
-def open_regular(path: str | os.PathLike[str], error: type[Error], noun: str) -> Iterator[BinaryIO]:
+def open_regular(path: str | os.PathLike[str], error: type[Error], noun: str) -> Iterator[BufferedReader]:
     """Open a regular file for reading bytes, and see to it that it does not change until it is closed.
 
     Parameters

@@ -20,4 +20,4 @@ def as_array(value: ArrayLike) -> np.ndarray:
 
 def masked_count(value: ArrayLike) -> int:
     """How many elements of an array, or of a list of arrays, are masked; 0 for what has no masks."""
-    return int(np.ma.count_masked(as_array(value)))
+    return int(np.count_nonzero(np.ma.getmaskarray(as_array(value))))

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, cast
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -149,7 +149,7 @@ def error_console() -> Console:
     """Standard error, for bars and messages of long work, which does not end with it."""
     from rich.console import Console
 
-    return Console(file=_Lasting())
+    return Console(file=cast("IO[str]", _Lasting()))
 
 
 class RichProgress:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from clvol.base.types import triple
 from clvol.volumes.sparse_places import BRICK_CELLS, SparsePlaces
 
 if TYPE_CHECKING:
@@ -29,7 +30,8 @@ def half_extrema(samples: np.ndarray, axis: int, combine: np.ufunc) -> np.ndarra
     blocks = samples[tuple(inner)].reshape(*shape[:axis], count, BOUND_CELLS, *shape[axis + 1 :])
     ends = [slice(None)] * samples.ndim
     ends[axis] = slice(BOUND_CELLS, None, BOUND_CELLS)
-    return combine(combine.reduce(blocks, axis=axis + 1), samples[tuple(ends)])
+    extrema: np.ndarray = combine(combine.reduce(blocks, axis=axis + 1), samples[tuple(ends)])
+    return extrema
 
 
 def half_means(samples: np.ndarray) -> np.ndarray:
@@ -52,12 +54,12 @@ def sparse_lattice(grid: SparseGrid) -> tuple[tuple[int, int, int], tuple[int, i
     """
     box = grid.active_box.astype(np.int64)
     lower = (box[0] - 1) // BRICK_CELLS * BRICK_CELLS
-    return tuple(int(n) for n in box[1] + 2 - lower), tuple(int(n) for n in lower)
+    return triple(box[1] + 2 - lower), triple(lower)
 
 
 def bricks_over(size: tuple[int, int, int]) -> tuple[int, int, int]:
     """Bricks per axis, z, y, x, over a lattice of `size` samples x, y, z."""
-    return tuple(-(-(n - 1) // BRICK_CELLS) for n in size[::-1])
+    return triple(-(-(n - 1) // BRICK_CELLS) for n in size[::-1])
 
 
 def gather_sparse(grid: SparseGrid, standing: SparsePlaces, places: np.ndarray) -> Iterator[np.ndarray]:
@@ -67,7 +69,7 @@ def gather_sparse(grid: SparseGrid, standing: SparsePlaces, places: np.ndarray) 
     """
     for first in range(0, len(places), CHUNK_BRICKS):
         chunk = places[first : first + CHUNK_BRICKS]
-        samples = np.empty((len(chunk), BRICK_EDGE, BRICK_EDGE, BRICK_EDGE, 1), np.float32)
+        samples = np.empty((len(chunk), BRICK_EDGE, BRICK_EDGE, BRICK_EDGE), np.float32)
         for corner in np.ndindex(2, 2, 2):
             source = tuple(slice(0, 1) if d else slice(0, 8) for d in corner)
             target = tuple(slice(8, 9) if d else slice(0, 8) for d in corner)
@@ -76,9 +78,9 @@ def gather_sparse(grid: SparseGrid, standing: SparsePlaces, places: np.ndarray) 
             block = np.empty((len(chunk), *(s.stop for s in source)), np.float32)
             block[:] = standing.constant(at)[:, None, None, None]
             filled = leaf >= 0
-            block[filled] = grid.leaf_values[leaf[filled]][(slice(None), *source)]
-            samples[(slice(None), *target, 0)] = block
-        yield samples
+            block[filled] = grid.leaf_values[leaf[filled]][:, *source]
+            samples[:, *target] = block
+        yield samples[..., None]
 
 
 def sparse_extrema(

@@ -14,7 +14,6 @@ import numpy as np
 
 from clvol.errors import VolumeError
 from clvol.volumes.brick_samples import (
-    BRICK_CELLS,
     BRICK_EDGE,
     gather_sparse,
     half_means,
@@ -22,6 +21,7 @@ from clvol.volumes.brick_samples import (
     sparse_lattice,
 )
 from clvol.volumes.files import place
+from clvol.volumes.sparse_places import BRICK_CELLS
 from clvol.volumes.tree import (
     NODE_ENTRIES,
     Tier,
@@ -113,7 +113,7 @@ class BrickTree:
         rows = np.flatnonzero(self.numbers < self.brick_count - len(self.constants))
         for first, samples in self._varying():
             means[rows[first : first + len(samples)]] = half_means(samples)
-        return np.clip(means, self.minimum, self.maximum)
+        return means.clip(self.minimum, self.maximum)
 
 
 def is_scattered(shape: tuple[int, int, int], places: int) -> bool:

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from clvol.base.types import triple
 from clvol.volumes.brick_samples import (
     BOUND_CELLS,
-    BRICK_CELLS,
     BRICK_EDGE,
     BRICK_SAMPLES,
     bricks_over,
@@ -30,7 +30,7 @@ from clvol.volumes.brick_samples import (
 from clvol.volumes.brick_tree import BrickTree, build_tree, check_extent, is_scattered
 from clvol.volumes.files import place
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
-from clvol.volumes.sparse_places import SparsePlaces
+from clvol.volumes.sparse_places import BRICK_CELLS, SparsePlaces
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -65,12 +65,13 @@ class BrickMap:
     @property
     def shape(self) -> tuple[int, int, int]:
         """Bricks per axis, z y x."""
-        return self.top.shape
+        return triple(self.top.shape)
 
     @property
     def peak(self) -> np.ndarray:
         """The largest value of each channel, float32 (channels,)."""
-        return self.maximum.max(axis=(0, 1, 2))
+        largest: np.ndarray = self.maximum.max(axis=(0, 1, 2))
+        return largest
 
     def stored(self) -> Iterator[tuple[int, np.ndarray]]:
         """Every brick to store, a bounded chunk at a time: (first brick, float32 (n, 9, 9, 9, channels))."""
@@ -107,7 +108,7 @@ class BrickMap:
         places = np.argwhere(varies)
         for first, samples in self._varying():
             _put_halves(means, places[first : first + len(samples)], half_means(samples))
-        return np.clip(means, self.minimum, self.maximum)
+        return means.clip(self.minimum, self.maximum)
 
 
 def build_bricks(grid: Grid) -> BrickMap | BrickTree:

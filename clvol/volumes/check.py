@@ -48,11 +48,11 @@ def _check(grid: Grid, what: str, signed: bool) -> None:
         low, high = slab.min(), slab.max()
         if (np.isfinite(low) if signed else low >= 0) and np.isfinite(high):
             continue
-        broken += slab.size - np.count_nonzero(np.isfinite(slab))
+        broken += slab.size - int(np.count_nonzero(np.isfinite(slab)))
         if signed:
             continue
         below = (slab < 0) & np.isfinite(slab)
-        negative += np.count_nonzero(below)
+        negative += int(np.count_nonzero(below))
         lowest = min(lowest, float(slab.min(where=below, initial=0.0)))
     faults = []
     if broken:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ from clvol.errors import VolumeError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from io import BufferedIOBase, BufferedReader
 
 TRUNCATED = "the file is truncated or damaged: copy or export it again"
 
@@ -30,7 +31,7 @@ NANOVDB = "convert this NanoVDB file to OpenVDB: nanovdb_convert FILE.nvdb FILE.
 
 
 @contextmanager
-def open_binary(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+def open_binary(path: str | os.PathLike[str]) -> Iterator[BufferedReader]:
     """Open `path` for reading bytes; VolumeError as `open_regular`, and if it is empty."""
     with open_regular(path, VolumeError, "volume file") as file:
         if os.fstat(file.fileno()).st_size == 0:
@@ -38,9 +39,9 @@ def open_binary(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         yield file
 
 
-def fill(array: np.ndarray, file: BinaryIO, where: str) -> None:
+def fill(array: np.ndarray, file: BufferedIOBase, where: str) -> None:
     """Read the bytes of a C-contiguous array; VolumeError if the file has fewer left."""
-    target = memoryview(array.reshape(-1)).cast("B")
+    target = array.reshape(-1).data.cast("B")
     filled = 0
     while filled < len(target):
         got = file.readinto(target[filled : filled + CHUNK])

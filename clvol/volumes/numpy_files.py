@@ -10,7 +10,7 @@ import struct
 import zipfile
 import zlib
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -18,6 +18,11 @@ from clvol.base.masks import as_array, masked_count
 from clvol.errors import VolumeError
 from clvol.volumes.files import CHUNK, MAX_BYTES, TRUNCATED, allocate, fill, open_binary, place
 from clvol.volumes.grid import DenseGrid
+
+if TYPE_CHECKING:
+    from io import BufferedIOBase, BufferedReader
+
+    from numpy.typing import ArrayLike
 
 log = logging.getLogger("clvol")
 
@@ -29,7 +34,7 @@ DEFLATE_RATIO = 1032
 ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError, ValueError, RuntimeError)
 
 
-def dense_from_array(array: object, name: str = "", source: str = "") -> DenseGrid:
+def dense_from_array(array: ArrayLike, name: str = "", source: str = "") -> DenseGrid:
     """An array as a grid on the unit cube.
 
     Parameters
@@ -109,7 +114,7 @@ def read_numpy(
         return _read_npz(file, path, grid, max_bytes)
 
 
-def _read_npy(file: BinaryIO, path: str | os.PathLike[str], max_bytes: int) -> DenseGrid:
+def _read_npy(file: BufferedReader, path: str | os.PathLike[str], max_bytes: int) -> DenseGrid:
     where, name = str(path), Path(path).stem
     dtype, shape, fortran = _read_header(file, where)
     available = os.fstat(file.fileno()).st_size - file.tell()
@@ -125,7 +130,9 @@ def _read_npy(file: BinaryIO, path: str | os.PathLike[str], max_bytes: int) -> D
     return _grid(_read_samples(file, dtype, shape, fortran, where), name, where)
 
 
-def _read_npz(file: BinaryIO, path: str | os.PathLike[str], grid: str | None, max_bytes: int) -> DenseGrid:
+def _read_npz(
+    file: BufferedReader, path: str | os.PathLike[str], grid: str | None, max_bytes: int
+) -> DenseGrid:
     where, size = str(path), os.fstat(file.fileno()).st_size
     try:
         with zipfile.ZipFile(file) as archive:
@@ -143,7 +150,7 @@ def _read_npz(file: BinaryIO, path: str | os.PathLike[str], grid: str | None, ma
                     TRUNCATED,
                 )
             with archive.open(member) as data:
-                values = _read_member(data, member, where, max_bytes)
+                values = _read_member(cast("zipfile.ZipExtFile", data), member, where, max_bytes)
     except ZIP_ERRORS as error:
         raise VolumeError(f"the archive is damaged ({error})", where, TRUNCATED) from None
     return _grid(values, name, str(path))
@@ -158,7 +165,7 @@ def _choose_array(names: list[str], grid: str | None, where: str) -> str:
     return names[0] if grid is None else grid
 
 
-def _read_member(data: BinaryIO, member: zipfile.ZipInfo, where: str, max_bytes: int) -> np.ndarray:
+def _read_member(data: BufferedIOBase, member: zipfile.ZipInfo, where: str, max_bytes: int) -> np.ndarray:
     dtype, shape, fortran = _read_header(data, where)
     count = math.prod(shape)
     nbytes = count * dtype.itemsize
@@ -173,7 +180,7 @@ def _read_member(data: BinaryIO, member: zipfile.ZipInfo, where: str, max_bytes:
 
 
 def _read_samples(
-    file: BinaryIO, dtype: np.dtype, shape: tuple[int, ...], fortran: bool, where: str
+    file: BufferedIOBase, dtype: np.dtype, shape: tuple[int, ...], fortran: bool, where: str
 ) -> np.ndarray:
     """The array at the file's position as C-order float32, some planes of another type or order at a time."""
     values = allocate(shape, np.float32, where)
@@ -201,7 +208,7 @@ def _check_memory(nbytes: int, max_bytes: int, where: str) -> None:
         )
 
 
-def _read_header(file: BinaryIO, where: str) -> tuple[np.dtype, tuple[int, ...], bool]:
+def _read_header(file: BufferedIOBase, where: str) -> tuple[np.dtype, tuple[int, ...], bool]:
     """dtype, shape, and whether the order is Fortran's; the file then stands at the samples.
 
     The header is the text of a Python dictionary.  Only the three plain fields NumPy writes are

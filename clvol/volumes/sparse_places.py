@@ -44,7 +44,8 @@ class SparsePlaces:
         self._tiles = [self._tiles_of(grid, int(edge)) for edge in np.unique(grid.tile_sizes)]
 
     def _holds(self, places: np.ndarray) -> np.ndarray:
-        return ((places >= 0) & (places <= np.array(self.shape))).all(axis=1)
+        inside: np.ndarray = np.all((places >= 0) & (places <= np.array(self.shape)), axis=1)
+        return inside
 
     def _tiles_of(self, grid: SparseGrid, edge: int) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
         """Edge, first brick places, keys and values of tiles of one size, those far outside left out."""
@@ -65,7 +66,8 @@ class SparsePlaces:
     def leaf(self, places: np.ndarray) -> np.ndarray:
         """Number of the leaf at each place, int (...), or -1."""
         if self._table is not None:
-            return self._table[tuple(np.moveaxis(places, -1, 0))]
+            numbers: np.ndarray = self._table[tuple(np.moveaxis(places, -1, 0))]
+            return numbers
         if not len(self._leaf_rows):
             return np.full(places.shape[:-1], -1, np.intp)
         row = rows_of(self._leaf_keys, keys(places))
@@ -101,7 +103,7 @@ class SparsePlaces:
         """The same as a bool for every place of a small box."""
         constant = np.full(table.shape, self.background, np.float32)
         if self._tiles:
-            constant = self.constant(np.stack(np.indices(table.shape), axis=-1))
+            constant = self.constant(np.stack(list(np.indices(table.shape)), axis=-1))
         nz, ny, nx = self.shape
         changes, own = np.zeros(self.shape, bool), constant[:-1, :-1, :-1]
         for z, y, x in _CORNERS:
@@ -128,7 +130,8 @@ class SparsePlaces:
     def _meets(self, places: np.ndarray) -> np.ndarray:
         around = places[:, None] + _CORNERS
         constant = self.constant(around)
-        return (self.leaf(around) >= 0).any(axis=1) | (constant != constant[:, :1]).any(axis=1)
+        met: np.ndarray = np.any((self.leaf(around) >= 0) | (constant != constant[:, :1]), axis=1)
+        return met
 
     def _at_leaves(self) -> Iterator[np.ndarray]:
         """Places of bricks that reach into a leaf."""

@@ -38,7 +38,8 @@ class Tier:
 def keys(places: np.ndarray) -> np.ndarray:
     """One int64 for each place, int (..., 3) of 0 to 2²¹ - 1, in their C order."""
     z, y, x = np.moveaxis(places.astype(np.int64), -1, 0)
-    return (z << 2 * _BITS) | (y << _BITS) | x
+    key: np.ndarray = (z << 2 * _BITS) | (y << _BITS) | x
+    return key
 
 
 def unique_places(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

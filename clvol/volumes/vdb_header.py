@@ -113,7 +113,7 @@ def read_file_header(stream: VdbStream) -> int:
     (count,) = stream.unpack("<i")
     if not 0 <= count <= (stream.end - stream.pos) // SMALLEST_GRID:
         stream.fail(f"{count} grids are announced in a file of {stream.end} bytes")
-    return count
+    return int(count)
 
 
 def read_metadata(stream: VdbStream) -> dict[str, bytes]:

@@ -6,7 +6,7 @@ import os
 import struct
 import zlib
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, BinaryIO, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import blosc
 from blosc.blosc_extension import error as BloscError  # noqa: N812
@@ -16,6 +16,7 @@ from clvol.volumes.files import TRUNCATED, open_binary
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from io import BufferedReader
 
 ZIP, ACTIVE_MASK, BLOSC = 1, 2, 4
 BLOSC_FORMAT = 2
@@ -32,7 +33,7 @@ class VdbStream:
     `where` names the file, and the grid once it is known, in the errors.
     """
 
-    def __init__(self, file: BinaryIO, where: str) -> None:
+    def __init__(self, file: BufferedReader, where: str) -> None:
         self.file, self.where = file, where
         self.pos, self.end = 0, file.seek(0, os.SEEK_END)
         self._window, self._first = b"", 0
@@ -63,7 +64,7 @@ class VdbStream:
         self.pos += count
         return self._window[at : at + count]
 
-    def unpack(self, layout: str) -> tuple:
+    def unpack(self, layout: str) -> tuple[Any, ...]:
         """The next values, by a `struct` layout (little-endian as OpenVDB writes)."""
         size = struct.calcsize(layout)
         at = self._locate(size)
@@ -138,7 +139,7 @@ def decompress_blosc(payload: bytes, nbytes: int) -> bytes:
     if not 0 < block_size <= nbytes:
         raise ValueError(f"blosc: blocks of {block_size} bytes")
     try:
-        values = blosc.decompress(payload)
+        values: bytes = blosc.decompress(payload)
     except BloscError as error:
         raise ValueError(f"blosc: {error}") from None
     if len(values) != nbytes:

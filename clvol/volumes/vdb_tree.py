@@ -172,7 +172,8 @@ class VdbTree:
                 f" more than the limit of {self.max_bytes} bytes can hold",
                 PRUNE,
             )
-        origins, seen = table["origin"][kept], set()
+        origins = table["origin"][kept]
+        seen: set[tuple[int, ...]] = set()
         for origin in origins.tolist():
             self.check_root_origin(tuple(origin), seen)
         if kept.size:
