@@ -15,6 +15,7 @@ import numpy as np
 
 from clvol.scene import records
 from clvol.scene.materials import Null
+from clvol.scene.primitives import mesh_of
 
 CONVEX = ("cube", "sphere")
 """Kinds of shape that a ray meets in one interval, found in closed form."""
@@ -81,7 +82,7 @@ def find_boundaries(scene: records.Scene) -> Boundaries:
     entry_of: dict[int, int] = {}  # of media that boundaries name
     surfaces, dividing = [], []
     for index, shape in enumerate(shapes):
-        if _is_interval(shape, exteriors, holders):
+        if shape.interior is not None and _is_interval(shape, exteriors, holders):
             if id(shape.interior) in exteriors:
                 entry_of[id(shape.interior)] = len(entries)
             entries.append(MediumEntry(shape.interior, shape))
@@ -149,11 +150,12 @@ def shape_bounds(shape: records.Shape) -> tuple[np.ndarray, np.ndarray]:
 
 def mesh_bounds(shape: records.Shape) -> tuple[np.ndarray, np.ndarray]:
     """World bounds of the vertices that faces use."""
-    used = np.unique(shape.mesh.faces)
+    mesh = mesh_of(shape)
+    used = np.unique(mesh.faces)
     linear, offset = shape.to_world[:3, :3], shape.to_world[:3, 3]
     lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
     for start in range(0, len(used), 1 << 16):
-        points = shape.mesh.vertices[used[start : start + (1 << 16)]] @ linear.T + offset
+        points = mesh.vertices[used[start : start + (1 << 16)]] @ linear.T + offset
         lower, upper = np.minimum(lower, points.min(axis=0)), np.maximum(upper, points.max(axis=0))
     return lower, upper
 

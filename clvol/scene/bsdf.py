@@ -18,6 +18,7 @@ from clvol.scene.materials import (
     RoughDielectric,
     RoughPlastic,
     Spectrum,
+    Texture,
     TwoSided,
 )
 from clvol.scene.refraction import INDICES, METALS
@@ -54,7 +55,8 @@ def thindielectric(reader: Reader) -> Dielectric:
 def roughdielectric(reader: Reader) -> RoughDielectric:
     """The `roughdielectric` plugin."""
     indices = _indices(reader, "bk7", differ=True)
-    return RoughDielectric(*indices, *_microfacets(reader), *_specular(reader))
+    distribution, alpha_u, alpha_v = _microfacets(reader)
+    return RoughDielectric(*indices, distribution, alpha_u, alpha_v, *_specular(reader))
 
 
 def conductor(reader: Reader) -> Conductor:
@@ -65,7 +67,9 @@ def conductor(reader: Reader) -> Conductor:
 def roughconductor(reader: Reader) -> RoughConductor:
     """The `roughconductor` plugin."""
     metal = _metal(reader)
-    return RoughConductor(*metal, *_microfacets(reader), texture(reader, "specular_reflectance", 1.0))
+    distribution, alpha_u, alpha_v = _microfacets(reader)
+    specular = texture(reader, "specular_reflectance", 1.0)
+    return RoughConductor(*metal, distribution, alpha_u, alpha_v, specular)
 
 
 def plastic(reader: Reader) -> Plastic:
@@ -127,7 +131,7 @@ def _nested(reader: Reader, most: int) -> list[tuple[str, Bsdf]]:
     return [(name, reader.build(node)) for name, node in found]
 
 
-def _specular(reader: Reader) -> tuple:
+def _specular(reader: Reader) -> tuple[Texture, Texture]:
     reflectance = texture(reader, "specular_reflectance", 1.0)
     return reflectance, texture(reader, "specular_transmittance", 1.0)
 

@@ -53,7 +53,7 @@ def _plain(tree: dict[str, Any]) -> dict[str, Any]:
 def _flat(nodes: list[dict[str, Any]], roots: list[int]) -> list[dict[str, Any]]:
     """The nodes of meshes below `roots`, each with its matrix to the world."""
     found, seen = [], set()
-    waiting = [(root, None) for root in reversed(roots)]
+    waiting: list[tuple[int, np.ndarray | None]] = [(root, None) for root in reversed(roots)]
     while waiting:
         number, parent = waiting.pop()
         if number in seen:

@@ -48,7 +48,8 @@ def moment(reader: Reader) -> Chosen:
     inner = reader.only_child("integrator")
     if inner is None:
         reader.fail("a moment integrator holds another one, this one is empty", hint="volpath, for instance")
-    return reader.build(inner)
+    chosen: Chosen = reader.build(inner)
+    return chosen
 
 
 def _limits(reader: Reader, choices: dict[str, str]) -> Integrator:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from clvol.errors import SceneError, shown
 from clvol.scene import bsdf, emitter, integrator, medium, phase, sensor, shape, texture, volume
@@ -129,7 +129,7 @@ def _build(root: Node, source: str) -> Scene:
     if root.type != "scene":
         raise SceneError(f"expected a scene, got a '{root.type}'", root.where)
     library = Library(root, PLUGINS)
-    records: dict[str, list] = {kind: [] for kind in PLUGINS}
+    records: dict[str, list[tuple[Node, Any]]] = {kind: [] for kind in PLUGINS}
     seen: set[int] = set()
     for name, value in root.parameters():
         if not isinstance(value, Node) or value.is_value:
@@ -141,7 +141,7 @@ def _build(root: Node, source: str) -> Scene:
             seen.add(id(node))
             records[library.kind_of(node)].append((node, build(node, library)))
     camera = _exactly_one_sensor(records["sensor"], root)
-    emitters = [pair for pair in records["emitter"] if not _is_inside(*pair, library)]
+    emitters = [(node, light) for node, light in records["emitter"] if not _is_inside(node, light, library)]
     _check_emitters(emitters)
     _check_used(records, library)
     return Scene(

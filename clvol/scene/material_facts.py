@@ -53,7 +53,7 @@ def side_kind(bsdf: Bsdf) -> str:
     return "THIN_DIELECTRIC" if isinstance(bsdf, Dielectric) and bsdf.thin else _KINDS[type(bsdf)]
 
 
-def bsdf_sides(bsdf: Bsdf) -> tuple[Side | None, Side | None]:
+def bsdf_sides(bsdf: Bsdf) -> tuple[Side, Side | None]:
     """Front and back of a surface; None: black.  What light passes has the same on both.
 
     Raises
@@ -64,7 +64,7 @@ def bsdf_sides(bsdf: Bsdf) -> tuple[Side | None, Side | None]:
     if isinstance(bsdf, TwoSided):
         front, back = bsdf_sides(bsdf.front)[0], bsdf_sides(bsdf.back)[0]
         for side in (front, back):
-            if side is None or side.opacities or side_kind(side.bsdf) in _TRANSMISSIVE:
+            if side.opacities or side_kind(side.bsdf) in _TRANSMISSIVE:
                 raise ValueError("a two-sided BSDF takes no BSDF that light passes")
         return front, back
     if isinstance(bsdf, Mask):
@@ -73,14 +73,15 @@ def bsdf_sides(bsdf: Bsdf) -> tuple[Side | None, Side | None]:
     return side, side if side_kind(bsdf) in _TRANSMISSIVE else None
 
 
-def _masked(mask: Mask) -> tuple[Side | None, Side | None]:
+def _masked(mask: Mask) -> tuple[Side, Side | None]:
     front, back = bsdf_sides(mask.nested)
     if isinstance(front.bsdf, Null) or mask.opacity in ((1.0,), (1.0, 1.0, 1.0)):
         return front, back
     if sum(isinstance(o, Bitmap | Checkerboard) for o in (mask.opacity, *front.opacities)) > 1:
         raise ValueError("only one of the masks round a BSDF may have a texture")
     back = Side(front.bsdf, front.opacities, black=True) if back is None else back
-    return tuple(replace(side, opacities=(*side.opacities, mask.opacity)) for side in (front, back))
+    front, back = (replace(side, opacities=(*side.opacities, mask.opacity)) for side in (front, back))
+    return front, back
 
 
 def _parts(bsdf: Bsdf) -> list[Side]:

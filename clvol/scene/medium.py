@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from clvol.scene.reader import BRIGHTEST, ROUNDING, Reader
 from clvol.scene.records import ConstVolume, GridVolume, Medium, Phase, Spectrum, Volume
 from clvol.scene.volume import channels_of, largest_value, limited
 from clvol.volumes import check_coefficients, check_finite
+from clvol.volumes.grid import DenseGrid
 from clvol.volumes.proportional import proportional_channels
 
 log = logging.getLogger("clvol")
@@ -78,14 +80,14 @@ def _reduced(reader: Reader, volume: GridVolume) -> tuple[GridVolume, Spectrum]:
 
     One look-up then serves all.  What media share stays shared.
     """
-    done = reader.library.reduced
-    if id(volume.grid) not in done:
-        done[id(volume.grid)] = proportional_channels(volume.grid)
-    if done[id(volume.grid)] is None:
+    done, grid = reader.library.reduced, volume.grid
+    if id(grid) not in done:
+        done[id(grid)] = proportional_channels(grid) if isinstance(grid, DenseGrid) else None
+    if done[id(grid)] is None:
         return volume, (1.0,)
-    grid, factors = done[id(volume.grid)]
+    one, factors = done[id(grid)]
     if id(volume) not in done:
-        done[id(volume)] = replace(volume, grid=grid)
+        done[id(volume)] = replace(volume, grid=one)
     return done[id(volume)], factors
 
 
@@ -111,12 +113,13 @@ def _volume(reader: Reader, name: str, expected: str) -> Volume:
     found = reader.children("volume", name)
     if not found:
         reader.refuse_plugin(name, expected)
-    return reader.build(found[0][1])
+    volume: Volume = reader.build(found[0][1])
+    return volume
 
 
-def _emission(reader: Reader) -> dict[str, object]:
+def _emission(reader: Reader) -> dict[str, Any]:
     """The fields of a Medium that say what it emits.  A spectrum is seen as that of a light."""
-    fields: dict[str, object] = {}
+    fields: dict[str, Any] = {}
     if reader.has("emission"):
         fields["emission"] = _coefficient(reader, "emission", 1.0, light=True)
     if reader.has("temperature"):

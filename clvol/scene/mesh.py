@@ -104,7 +104,8 @@ def _with_area(vertices: np.ndarray, faces: np.ndarray, source: str) -> np.ndarr
     if not kept.any():
         raise ValueError("none of its triangles has an area")
     log.warning("%s: %d of %d triangles have no area and are left out", source, (~kept).sum(), len(faces))
-    return faces[kept]
+    left: np.ndarray = faces[kept]
+    return left
 
 
 def _once(vertices: np.ndarray, faces: np.ndarray, source: str) -> np.ndarray:
@@ -190,7 +191,8 @@ def smooth_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def _unit(v: np.ndarray) -> np.ndarray:
-    return v / np.linalg.norm(v, axis=1, keepdims=True)
+    unit: np.ndarray = v / np.linalg.norm(v, axis=1, keepdims=True)
+    return unit
 
 
 def mesh_flaws(mesh: Mesh) -> list[str]:

@@ -17,6 +17,9 @@ from clvol.scene.obj import read_obj
 from clvol.scene.ply import read_ply
 
 if TYPE_CHECKING:
+    from trimesh import Trimesh
+    from trimesh.resolvers import FilePathResolver
+
     from clvol.scene.records import Mesh
 
 log = logging.getLogger("clvol")
@@ -49,7 +52,7 @@ def read_mesh(
         raise ValueError(f"it cannot be read as {kind}: {reason}{hint}") from None
     if flip_tex_coords and raw.uvs is not None:
         raw.uvs[:, 1] = 1 - raw.uvs[:, 1]
-    if raw.without_uvs is not None:
+    if raw.uvs is not None and raw.without_uvs is not None:
         raw.uvs[raw.without_uvs] = 0
         bare = int(raw.without_uvs[raw.faces].any(axis=1).sum())
         log.warning(
@@ -70,10 +73,10 @@ def _read_with_trimesh(path: Path, kind: str) -> RawMesh:
     import trimesh  # takes half a second, which scenes without meshes are spared
 
     with np.errstate(all="ignore"):
-        options = {"process": False, "maintain_order": True, "resolver": _regular_files(path)}
         data = path.read_bytes()
         file = io.BytesIO(data if kind == "stl" else plain_gltf(data, kind))
-        loaded = trimesh.load(file, file_type=kind, **options)
+        finder = _regular_files(path)
+        loaded = trimesh.load(file, file_type=kind, resolver=finder, process=False, maintain_order=True)
     if isinstance(loaded, trimesh.Trimesh):
         return _raw(loaded, np.eye(4))
     parts = []
@@ -85,7 +88,7 @@ def _read_with_trimesh(path: Path, kind: str) -> RawMesh:
     return _joined(parts)
 
 
-def _regular_files(path: Path) -> object:
+def _regular_files(path: Path) -> FilePathResolver:
     """Finds the files that a mesh names, in its folder as trimesh does, and waits for no pipe among them."""
     from trimesh.resolvers import FilePathResolver
 
@@ -96,12 +99,13 @@ def _regular_files(path: Path) -> object:
             for part in (name.strip(), name.strip().lstrip("/"), Path(name).name):
                 if kind := other_kind(Path(self.parent, part)):
                     raise ValueError(f"'{part}', which it names, is {kind}, not a file")
-            return super().get(name)
+            data: bytes = super().get(name)
+            return data
 
     return RegularFiles(str(path))
 
 
-def _raw(mesh: object, to_world: np.ndarray) -> RawMesh:
+def _raw(mesh: Trimesh, to_world: np.ndarray) -> RawMesh:
     """A trimesh under a transform; only the normals that its file holds."""
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
     normals = np.asarray(mesh.vertex_normals) if "vertex_normals" in mesh._cache else None

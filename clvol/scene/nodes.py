@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from clvol.errors import SceneError, shown
 
@@ -21,7 +22,7 @@ VALUE_TYPES = ("rgb", "spectrum")
 """Nodes that stand for a value, not for a plugin."""
 
 
-class Node(dict):
+class Node(dict[str, Any]):
     """One plugin or colour: parameter name -> value, with the plugin's name under "type".
 
     Parameters
@@ -49,7 +50,8 @@ class Node(dict):
     @property
     def type(self) -> str:
         """The plugin's name."""
-        return self["type"]
+        name: str = self["type"]
+        return name
 
     @property
     def is_value(self) -> bool:
@@ -83,7 +85,7 @@ class Node(dict):
         self._nameless += 1
 
 
-def from_dict(source: Mapping, where: str = "scene", depth: int = 0) -> Node:
+def from_dict(source: Mapping[str, object], where: str = "scene", depth: int = 0) -> Node:
     """A scene dict as nodes; `where` is the path so far, as in ``scene.shape_1.interior``.
 
     Raises

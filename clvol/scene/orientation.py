@@ -104,7 +104,8 @@ def _volumes(mesh: Mesh) -> np.ndarray:
     """What each triangle adds to the volume, about the middle of the mesh; float64 (triangles,)."""
     middle = mesh.vertices.mean(axis=0, dtype=np.float64)
     a, b, c = (mesh.vertices[mesh.faces[:, n]].astype(np.float64) - middle for n in range(3))
-    return (a * np.cross(b, c)).sum(axis=1) / 6
+    volumes: np.ndarray = (a * np.cross(b, c)).sum(axis=1) / 6
+    return volumes
 
 
 def _is_inside(point: np.ndarray, triangles: np.ndarray) -> bool:

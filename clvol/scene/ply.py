@@ -46,6 +46,10 @@ class _Lists:
     sizes: np.ndarray
 
 
+_Columns = dict[str, np.ndarray | _Lists]
+"""The properties of an element, each of all rows."""
+
+
 def read_ply(data: bytes) -> RawMesh:
     """Positions, faces (polygons as triangles), normals and texture coordinates of a PLY file.
 
@@ -59,7 +63,7 @@ def read_ply(data: bytes) -> RawMesh:
     form, elements, body = _header(data)
     if form == "=":
         body, elements = _as_binary(body, elements)
-    found: dict[str, dict[str, np.ndarray | _Lists]] = {}
+    found: dict[str, _Columns] = {}
     place = 0
     for element in elements:
         found[element.name], place = _rows(body, place, element, form)
@@ -70,7 +74,7 @@ def read_ply(data: bytes) -> RawMesh:
     if positions is None:
         raise ValueError("vertices without x, y and z")
     faces = found.get("face", {})
-    polygons = next((faces[name] for name in _INDICES if isinstance(faces.get(name), _Lists)), None)
+    polygons = next((p for name in _INDICES if isinstance(p := faces.get(name), _Lists)), None)
     if polygons is None or not len(polygons.sizes):
         raise ValueError("it has no triangles")
     uvs = next((uv for names in _UVS if (uv := _columns(vertices, names)) is not None), None)
@@ -132,7 +136,7 @@ def _header(data: bytes) -> tuple[str, list[_Element], bytes]:
                 elements[-1].properties.append((name, _type(kind), _type(count)))
             case ["property", kind, name] if elements:
                 elements[-1].properties.append((name, _type(kind), ""))
-    if not form or not lines[0].startswith("ply"):
+    if not end or not form or not lines[0].startswith("ply"):
         raise ValueError("it has no header of a ply")
     return form, elements, data[end.end() :]
 
@@ -155,17 +159,15 @@ def _as_binary(body: bytes, elements: list[_Element]) -> tuple[bytes, list[_Elem
     return numbers.tobytes(), doubles
 
 
-def _columns(rows: dict[str, np.ndarray | _Lists], names: tuple[str, ...]) -> np.ndarray | None:
+def _columns(rows: _Columns, names: tuple[str, ...]) -> np.ndarray | None:
     """Properties `names` side by side, float64; None where one is missing."""
-    columns = [rows.get(name) for name in names]
-    if not all(isinstance(column, np.ndarray) for column in columns):
+    columns = [column for name in names if isinstance(column := rows.get(name), np.ndarray)]
+    if len(columns) < len(names):
         return None
     return np.stack([column.astype(np.float64) for column in columns], axis=1)
 
 
-def _rows(
-    body: bytes, place: int, element: _Element, form: str
-) -> tuple[dict[str, np.ndarray | _Lists], int]:
+def _rows(body: bytes, place: int, element: _Element, form: str) -> tuple[_Columns, int]:
     """The properties of all rows of an element that begins at byte `place`, and where it ends."""
     properties = [
         (n, np.dtype(form + k), np.dtype(form + c) if c else None) for n, k, c in element.properties
@@ -173,15 +175,15 @@ def _rows(
     if not element.count or not properties:
         return {}, place
     sizes = [counts[0] for counts, _ in _walk(body, place, properties, 1, element.name)[0]]
-    row = []
+    fields: list[tuple[str, np.dtype] | tuple[str, np.dtype, tuple[int]]] = []
     for n, ((_, kind, counted), size) in enumerate(zip(properties, sizes, strict=True)):
-        row += [(f"count {n}", counted)] if counted else []
-        row.append((f"{n}", kind, (size,)))
-    row = np.dtype(row)
+        fields += [(f"count {n}", counted)] if counted else []
+        fields.append((f"{n}", kind, (size,)))
+    row = np.dtype(fields)
     if row.itemsize * element.count > len(body) - place:
         return _uneven_rows(body, place, element, properties)
     table = np.frombuffer(body, row, element.count, place)
-    found = {}
+    found: _Columns = {}
     for n, ((name, _, counted), size) in enumerate(zip(properties, sizes, strict=True)):
         values = table[f"{n}"]
         if not counted:
@@ -195,10 +197,10 @@ def _rows(
 
 def _uneven_rows(
     body: bytes, place: int, element: _Element, properties: list[_Property]
-) -> tuple[dict[str, np.ndarray | _Lists], int]:
+) -> tuple[_Columns, int]:
     """`_rows` where lists are not all as long as in the first row."""
     columns, end = _walk(body, place, properties, element.count, element.name)
-    found = {}
+    found: _Columns = {}
     for (name, kind, counted), (sizes, parts) in zip(properties, columns, strict=True):
         values = np.frombuffer(b"".join(parts), kind)
         found[name] = _Lists(values, np.array(sizes, np.int64)) if counted else values
@@ -209,7 +211,7 @@ def _walk(
     body: bytes, place: int, properties: list[_Property], rows: int, name: str
 ) -> tuple[list[tuple[list[int], list[bytes]]], int]:
     """How many values each property has in each row, and their bytes; and where the rows end."""
-    columns = [([], []) for _ in properties]
+    columns: list[tuple[list[int], list[bytes]]] = [([], []) for _ in properties]
     steps = []
     for (_, kind, counted), (sizes, parts) in zip(properties, columns, strict=True):
         count = counted and struct.Struct((">" if counted.str[0] == ">" else "<") + counted.char)

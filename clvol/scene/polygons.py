@@ -103,7 +103,8 @@ def _clip_ears(points: np.ndarray, normal: np.ndarray) -> np.ndarray | None:
 
 def _twice_area(flat: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     (ux, uy), (vx, vy) = ((flat[triangles[:, n]] - flat[triangles[:, 0]]).T for n in (1, 2))
-    return ux * vy - uy * vx
+    area: np.ndarray = ux * vy - uy * vx
+    return area
 
 
 def _with_all_corners(flat: np.ndarray, triangles: np.ndarray) -> np.ndarray:

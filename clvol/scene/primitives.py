@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from clvol.scene.records import Mesh
+from clvol.scene.records import Mesh, Shape
 
 _CUBE = np.array(  # each face counter-clockwise from its corner at (u, v) = (0, 1), towards (1, 1)
     [
@@ -31,6 +31,11 @@ def canonical_mesh(kind: str) -> Mesh:
     return {"cube": _cube, "rectangle": _rectangle}[kind]()
 
 
+def mesh_of(shape: Shape) -> Mesh:
+    """The triangles of a shape that is made of them: its own, or those of its kind; else KeyError."""
+    return canonical_mesh(shape.kind) if shape.mesh is None else shape.mesh
+
+
 def _cube() -> Mesh:
     uvs = np.tile(np.array([(0, 1), (1, 1), (1, 0), (0, 0)], np.float32), (6, 1))
     return Mesh(_CUBE.reshape(-1, 3).copy(), _halves(6), None, uvs, "cube")
@@ -43,4 +48,5 @@ def _rectangle() -> Mesh:
 def _halves(quads: int) -> np.ndarray:
     """Two triangles for every four vertices, int32."""
     first = 4 * np.arange(quads)[:, None, None]
-    return (first + np.array([(0, 1, 2), (3, 0, 2)])).reshape(-1, 3).astype(np.int32)
+    faces: np.ndarray = (first + np.array([(0, 1, 2), (3, 0, 2)])).reshape(-1, 3)
+    return faces.astype(np.int32)

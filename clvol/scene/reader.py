@@ -39,7 +39,7 @@ BRIGHTEST = 1e15
 BY_NAME = ("volume", "texture")
 """Kinds of plugin that stand for the value of a parameter, and are found by its name."""
 
-_PLAIN = {bool: (bool, np.bool_), int: Integral, float: Real, str: str}
+_PLAIN: dict[type, Any] = {bool: (bool, np.bool_), int: Integral, float: Real, str: str}
 _PLAIN_NAMES = {bool: "true or false", int: "an integer", float: "a number", str: "a string"}
 
 
@@ -69,11 +69,11 @@ class Reader:
         where = self.node.place(name) if name else self.node.where
         raise SceneError(what, where, hint)
 
-    def raw(self, name: str) -> object:
+    def raw(self, name: str) -> Any:
         """The value of `name` as it is given, or None."""
         return self._take(name) if self.has(name) else None
 
-    def _take(self, name: str) -> object:
+    def _take(self, name: str) -> Any:
         self._used.add(name)
         return self.node[name]
 
@@ -204,7 +204,7 @@ class Reader:
         components = tuple(np.minimum(rgb, maximum).tolist())
         return components[:1] if len(set(components)) == 1 else components
 
-    def _colour_value(self, name: str, node: Node) -> object:
+    def _colour_value(self, name: str, node: Node) -> Any:
         extra = [key for key, _ in node.parameters() if key != "value"]
         if extra or "value" not in node:
             self.fail(

@@ -39,7 +39,7 @@ def perspective(reader: Reader) -> Sensor:
     """The `perspective` plugin; a focal length is for 35 mm film, along the diagonal."""
     camera = _pinhole(reader)
     reader.ignore(focus_distance=float)  # everything is sharp
-    offset = tuple(reader.number(f"principal_point_offset_{axis}", 0.0) for axis in "xy")
+    offset = (reader.number("principal_point_offset_x", 0.0), reader.number("principal_point_offset_y", 0.0))
     return _sensor(reader, replace(camera, principal_point_offset=offset))
 
 

@@ -56,7 +56,9 @@ XYZ_TO_SRGB = np.array(
 def _sampled(text: str, step: float, wavelengths: np.ndarray) -> np.ndarray:
     """A table (values from `FIRST_NM` every `step` nm, 0 after its end) interpolated at `wavelengths`."""
     values = np.array(text.split(), dtype=np.float64)
-    return np.interp(wavelengths, FIRST_NM + step * np.arange(len(values)), values, right=0.0)
+    at = FIRST_NM + step * np.arange(len(values))
+    found: np.ndarray = np.interp(wavelengths, at, values, right=0.0)
+    return found
 
 
 @cache
@@ -69,7 +71,8 @@ def observer() -> tuple[np.ndarray, np.ndarray]:
 
 def constant_to_rgb(value: float) -> np.ndarray:
     """Linear sRGB, float64 (3,), of a spectrum of the same `value` everywhere under equal energy."""
-    return value * XYZ_TO_SRGB.sum(axis=1)
+    white: np.ndarray = XYZ_TO_SRGB.sum(axis=1)
+    return value * white
 
 
 def sampled_to_rgb(wavelengths: np.ndarray, values: np.ndarray, light: bool) -> np.ndarray:
@@ -82,7 +85,8 @@ def sampled_to_rgb(wavelengths: np.ndarray, values: np.ndarray, light: bool) -> 
     if not light:
         weights = weights * (_sampled(_D65, 10.0, at) / D65_NORMALISATION)
     xyz = weights @ np.interp(at, wavelengths, values, left=0.0, right=0.0)
-    return np.maximum(XYZ_TO_SRGB @ xyz, 0.0)
+    rgb: np.ndarray = np.maximum(XYZ_TO_SRGB @ xyz, 0.0)
+    return rgb
 
 
 def srgb_to_linear(encoded: np.ndarray) -> np.ndarray:

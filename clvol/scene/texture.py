@@ -71,7 +71,8 @@ def texture(reader: Reader, name: str, default: float) -> Texture:
     found = reader.children("texture", name)
     if not found:
         reader.refuse_plugin(name, "a number, an rgb, a spectrum or a texture")
-    return reader.build(found[0][1])
+    picture: Texture = reader.build(found[0][1])
+    return picture
 
 
 def constant(reader: Reader, name: str, default: float, minimum: float) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 from clvol.errors import SceneError
 from clvol.scene import records
 from clvol.scene.boundaries import Boundaries, MediumEntry, is_clipped, scene_sphere, shape_bounds
-from clvol.scene.primitives import canonical_mesh
+from clvol.scene.primitives import mesh_of
 
 log = logging.getLogger("clvol")
 
@@ -39,7 +39,8 @@ def bounding_boxes(entry: MediumEntry) -> list[np.ndarray]:
 
 def widths(box: np.ndarray) -> np.ndarray:
     """Distances between the opposite faces of such a box, float64 (3,)."""
-    return 2 / np.linalg.norm(np.linalg.inv(box)[:3, :3], axis=1)
+    distances: np.ndarray = 2 / np.linalg.norm(np.linalg.inv(box)[:3, :3], axis=1)
+    return distances
 
 
 def thin_media(scene: records.Scene, found: Boundaries) -> list[bool]:
@@ -91,15 +92,17 @@ def check_thinness(scene: records.Scene, found: Boundaries) -> None:
 
 def _needs_places(medium: records.Medium) -> bool:
     fields = (medium.sigma_t, medium.albedo, *((medium.emission, medium.temperature) if medium.emits else ()))
-    varies = any(isinstance(field, records.GridVolume) for field in fields)
-    return varies or max(medium.albedo.value) > 0
+    if any(isinstance(field, records.GridVolume) for field in fields):
+        return True
+    return isinstance(medium.albedo, records.ConstVolume) and max(medium.albedo.value) > 0
 
 
 def _coordinates(box: np.ndarray, centre: np.ndarray) -> np.ndarray:
     """Magnitude of the coordinates that a place across each pair of faces is computed from, float64 (3,)."""
     across = np.abs(np.linalg.inv(box)[:3, :3])
     across /= np.linalg.norm(across, axis=1, keepdims=True)
-    return across @ (np.abs(box[:3, 3] - centre) + np.abs(box[:3, :3]).sum(axis=1))
+    magnitudes: np.ndarray = across @ (np.abs(box[:3, 3] - centre) + np.abs(box[:3, :3]).sum(axis=1))
+    return magnitudes
 
 
 def mean_chord(shape: records.Shape) -> float:
@@ -112,7 +115,7 @@ def mean_chord(shape: records.Shape) -> float:
         return float(4 / 3 * np.linalg.svd(linear, compute_uv=False).min())
     if shape.kind not in ("cube", "mesh"):
         return 0.0
-    mesh = canonical_mesh("cube") if shape.kind == "cube" else shape.mesh
+    mesh = mesh_of(shape)
     corners = (mesh.vertices.astype(float) @ linear.T)[mesh.faces]
     corners -= corners[0, 0]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -5,7 +5,7 @@ They are plain float64 arrays; anything with a 4x4 ``.matrix`` (as ``mi.ScalarTr
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -78,7 +78,7 @@ def look_at(origin: ArrayLike, target: ArrayLike, up: ArrayLike) -> np.ndarray:
     return matrix
 
 
-def as_matrix(value: object) -> np.ndarray:
+def as_matrix(value: Any) -> np.ndarray:
     """`value` (4x4 array, or an object with a 4x4 ``.matrix``) as an invertible, affine float64 matrix.
 
     Raises
