@@ -79,7 +79,8 @@ def _merge(values: np.ndarray, combine: np.ufunc) -> np.ndarray:
 
 def _merged_mean(values: np.ndarray) -> np.ndarray:
     ones = np.ones((*values.shape[:3], 1), np.float64)
-    return (_merge(values.astype(np.float64), np.add) / _merge(ones, np.add)).astype(np.float32)
+    means: np.ndarray = _merge(values.astype(np.float64), np.add) / _merge(ones, np.add)
+    return means.astype(np.float32)
 
 
 def with_slack(

@@ -203,4 +203,5 @@ def _packets(tree: BinaryTree, leaves: np.ndarray, vertices: np.ndarray, faces: 
 def _holds_quadrics(packets: np.ndarray, triangles: int) -> np.ndarray:
     """Which packets have a primitive beyond the triangles."""
     primitive = packets[:, 9].view(np.uint32)
-    return ((primitive >= triangles) & (primitive != NO_PRIMITIVE)).any(axis=1)
+    holds: np.ndarray = np.any((primitive >= triangles) & (primitive != NO_PRIMITIVE), axis=1)
+    return holds

@@ -65,7 +65,9 @@ def split_boxes(box: np.ndarray) -> BinaryTree:
         known += 2 * int(np.count_nonzero(inner))
         places = np.zeros(len(counts), np.int32)
         places[~inner] = leaf_total + np.cumsum(counts[~inner]) - counts[~inner]
-        left.append(children), first.append(places), count.append(np.where(inner, 0, counts).astype(np.int32))
+        left.append(children)
+        first.append(places)
+        count.append(np.where(inner, 0, counts).astype(np.int32))
         if not inner.all():
             active = np.repeat(inner, counts)
             leaves.append(order[~active])
@@ -143,16 +145,17 @@ def _choose_in_chunk(level: _Level, first: int, last: int) -> None:
 
 def _bin_of(centroid: np.ndarray, low: np.ndarray, scale: np.ndarray, bins: int) -> np.ndarray:
     """Bin of each doubled centroid, int32."""
-    return np.minimum(((centroid - low) * scale).astype(np.int32), bins - 1)
+    number: np.ndarray = np.minimum(((centroid - low) * scale).astype(np.int32), bins - 1)
+    return number
 
 
 def _plane_costs(box: np.ndarray, key: np.ndarray, nodes: int, bins: int) -> np.ndarray:
     """Cost of splitting after each bin but the last, float32 (nodes, bins - 1); inf if a side stays empty."""
     number = np.bincount(key, minlength=nodes * bins).reshape(nodes, bins)
-    binned = np.full((6, nodes * bins), np.inf, np.float32)
+    flat = np.full((6, nodes * bins), np.inf, np.float32)
     for row in range(6):
-        np.minimum.at(binned[row], key, box[row])
-    binned = binned.reshape(6, nodes, bins)
+        np.minimum.at(flat[row], key, box[row])
+    binned = flat.reshape(6, nodes, bins)
     below = np.cumsum(number, axis=1)[:, :-1]
     above = number.sum(axis=1, keepdims=True) - below
     lower_area = half_area(np.minimum.accumulate(binned, axis=2))[:, :-1]
@@ -199,7 +202,7 @@ def _on_the_right(level: _Level, first: int, last: int, node: np.ndarray) -> np.
     lane = chosen[node]
     centroid = np.choose(lane, [box[a] - box[a + 3] for a in range(3)])
     low, scale = level.low[:, first:last][chosen, each], level.scale[:, first:last][chosen, each]
-    right = _bin_of(centroid, low[node], scale[node], bins) > plane[node]
+    right: np.ndarray = _bin_of(centroid, low[node], scale[node], bins) > plane[node]
     halved = np.flatnonzero(axis < 0)
     if len(halved):
         members = np.flatnonzero((axis < 0)[node])
@@ -213,4 +216,5 @@ def _longest_centroid(box: np.ndarray, starts: np.ndarray, node: np.ndarray) -> 
     """Doubled centroids along the axis in which those of a node differ most."""
     centroids = np.stack([box[a] - box[a + 3] for a in range(3)])
     extents = np.maximum.reduceat(centroids, starts, axis=1) - np.minimum.reduceat(centroids, starts, axis=1)
-    return np.choose(np.argmax(extents, axis=0)[node], centroids)
+    longest: np.ndarray = np.choose(np.argmax(extents, axis=0)[node], centroids)
+    return longest

@@ -40,9 +40,17 @@ _LEAST_SPREAD = 2.0**-20
 class CellBounds(Protocol):
     """Anything that holds extrema and perhaps means of cells: Bounds, KdTree, the boxes it is built of."""
 
-    minimum: np.ndarray
-    maximum: np.ndarray
-    mean: np.ndarray | None
+    @property
+    def minimum(self) -> np.ndarray:
+        """Lower bounds, float32 (..., channels)."""
+
+    @property
+    def maximum(self) -> np.ndarray:
+        """Upper bounds."""
+
+    @property
+    def mean(self) -> np.ndarray | None:
+        """Means, where there are any."""
 
 
 def scaled_majorant(maximum: np.ndarray, majorant_scale: float = 1.0) -> np.ndarray:
@@ -77,9 +85,12 @@ def control(
         return np.zeros_like(minimum)
     majorant = scaled_majorant(maximum, majorant_scale)[..., None]
     if kind == "min":
-        return np.minimum(minimum, majorant)
+        least: np.ndarray = np.minimum(minimum, majorant)
+        return least
     if kind != "fitted":
         raise ValueError(f"no control {kind!r}")
+    if mean is None:
+        raise ValueError("a fitted control needs means")
     half = np.float32(0.5)
     bounded = np.minimum(half * minimum + half * majorant, _LARGEST_SHARE * majorant)
     spread, above = maximum - minimum, maximum - mean
@@ -93,7 +104,8 @@ def control(
         bounded = np.where(constant[..., None], majorant, bounded)
     if longest is not None:
         bounded = np.minimum(bounded, _raised(minimum, LONGEST_GROWTH / 8, longest))
-    return np.minimum(mean, bounded)
+    fitted: np.ndarray = np.minimum(mean, bounded)
+    return fitted
 
 
 def residual(
@@ -118,6 +130,8 @@ def residual(
     if kind not in ("mean", "min", "max"):
         raise ValueError(f"no residual control {kind!r}")
     chosen = {"mean": mean, "min": minimum, "max": maximum}[kind]
+    if chosen is None:
+        raise ValueError("a control at the mean needs means")
     if longest is not None:
         span = over_channels(maximum - minimum, np.maximum)[..., None].astype(np.float64)
         growth = np.sqrt(LONGEST_GROWTH / 2 * span * longest.max())
@@ -138,12 +152,14 @@ def looseness(cells: CellBounds, kind: Control, majorant_scale: float = 1.0) -> 
         return majorant
     subtracted = control(cells.minimum, cells.maximum, cells.mean, kind, majorant_scale).astype(np.float64)
     mean = over_channels(subtracted, np.add) / subtracted.shape[-1]
-    return np.maximum(majorant - mean, 0.0)
+    loose: np.ndarray = np.maximum(majorant - mean, 0.0)
+    return loose
 
 
 def _raised(minimum: np.ndarray, depth: np.ndarray | float, longest: np.ndarray) -> np.ndarray:
     """The minimum and as much as makes the optical depth `depth` along the longest way; float32."""
-    return (minimum + depth / np.maximum(longest, 1e-300)).astype(np.float32)
+    raised: np.ndarray = minimum + depth / np.maximum(longest, 1e-300)
+    return raised.astype(np.float32)
 
 
 def _rounded_up(values: np.ndarray) -> np.ndarray:

@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from clvol.accel.cells import Cells
 from clvol.accel.controls import Control, scaled_majorant
-from clvol.accel.kdtree_costs import DEEPER, LEAF, Boxes, Costs, Key, Level, weigh
+from clvol.accel.kdtree_costs import DEEPER, LEAF, Costs, Key, Level, weigh
+from clvol.base.types import triple
 
 if TYPE_CHECKING:
     from clvol.accel.bounds import Bounds
@@ -49,7 +51,7 @@ class Grown(NamedTuple):
     """Trees as nodes, uint32 (m, 2), the roots first, and the boxes of their leaves, in their order."""
 
     nodes: np.ndarray
-    leaves: Boxes
+    leaves: Cells
     depth: int
 
 
@@ -81,7 +83,7 @@ def build_kdtree(
     """
     costs = Costs(rate, leaf_cost, step_cost, control, majorant_scale)
     shape = bounds.maximum.shape[:3]
-    depths: Key = tuple(int(n - 1).bit_length() for n in shape)
+    depths = triple(int(n - 1).bit_length() for n in shape)
     edges = [
         (extent * np.minimum(np.arange((1 << depth) + 1), n))[None]
         for extent, n, depth in zip(cell_extent[::-1], shape, depths, strict=True)
@@ -93,12 +95,12 @@ def build_kdtree(
     return KdTree(grown.nodes, low, high, mean, cost, len(high), grown.depth)
 
 
-def _padded(bounds: Bounds, depths: Key) -> Boxes:
+def _padded(bounds: Bounds, depths: Key) -> Cells:
     """The lattice filled up to powers of two by cells that bound nothing; one of n."""
     pad = [(0, (1 << d) - n) for d, n in zip(depths, bounds.maximum.shape, strict=False)] + [(0, 0)]
     mean = None if bounds.mean is None else np.pad(bounds.mean, pad)[None]
     low, high = np.pad(bounds.minimum, pad, constant_values=np.inf), np.pad(bounds.maximum, pad)
-    return Boxes(low[None], high[None], mean)
+    return Cells(low[None], high[None], mean)
 
 
 def pack_maximum(high: np.ndarray) -> np.ndarray:
@@ -145,7 +147,7 @@ def grow(
         node = np.empty((len(at), 2), np.uint32)
         first += len(at)
         inner, leaf, deeper = (split >= 0) & (split < DEEPER), split == LEAF, split == DEEPER
-        rows.append([None if values is None else values[leaf] for values in boxes])
+        rows.append(boxes.at(leaf))
         node[leaf, 0] = pack_maximum(scaled_majorant(boxes.maximum[leaf], majorant_scale))
         node[leaf, 1] = first_leaf + np.arange(np.count_nonzero(leaf))
         if roots is not None:
@@ -163,26 +165,22 @@ def grow(
         node[inner, 0] = (plane.astype(np.uint32) << 2) | (2 - axis).astype(np.uint32)
         node[inner, 1] = first + 2 * pair.astype(np.uint32)
         blocks.append(node)
-    leaves = Boxes(*(None if part[0] is None else np.concatenate(part) for part in zip(*rows, strict=True)))
-    return Grown(np.concatenate(blocks), leaves, len(blocks))
+    return Grown(np.concatenate(blocks), Cells.joined(rows), len(blocks))
 
 
 def _frontier(
     levels: dict[Key, Level], keys: np.ndarray, at: np.ndarray, member: np.ndarray
-) -> tuple[np.ndarray, Boxes]:
+) -> tuple[np.ndarray, Cells]:
     """Splits of the boxes `at` of the levels `keys` of lattices `member`, and those boxes, (n, channels)."""
-    boxes = levels[0, 0, 0].boxes
+    whole = levels[0, 0, 0].boxes
     split = np.empty(len(at), np.int64)
-    minimum = np.empty((len(at), boxes.minimum.shape[-1]), np.float32)
-    maximum = np.empty_like(minimum)
-    mean = None if boxes.mean is None else np.empty_like(minimum)
+    boxes = whole.each(lambda values: np.empty((len(at), values.shape[-1]), np.float32))
     unique, group = np.unique(keys, axis=0, return_inverse=True)
     for number, key in enumerate(unique):
         of_key = group.reshape(-1) == number
-        level, place = levels[tuple(int(k) for k in key)], (member[of_key], *at[of_key].T)
+        level, place = levels[triple(key)], (member[of_key], *at[of_key].T)
         split[of_key] = level.split[place]
-        maximum[of_key] = level.boxes.maximum[place]
-        minimum[of_key] = np.minimum(level.boxes.minimum[place], maximum[of_key])  # inf beyond the lattice
-        if mean is not None:
-            mean[of_key] = level.boxes.mean[place]
-    return split, Boxes(minimum, maximum, mean)
+        for values, known in zip(boxes.arrays(), level.boxes.arrays(), strict=True):
+            values[of_key] = known[place]
+    np.minimum(boxes.minimum, boxes.maximum, out=boxes.minimum)  # inf beyond the lattice
+    return split, boxes

@@ -12,7 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from clvol.accel.cells import Cells
 from clvol.accel.controls import Control, looseness
+from clvol.base.types import triple
 
 LEAF, DEEPER = -1, 3
 """What a box is where it is not split along an axis: a leaf, or a tree of its own within a finest box."""
@@ -32,14 +34,6 @@ class Costs:
     majorant_scale: float
 
 
-class Boxes(NamedTuple):
-    """Extrema and perhaps means of boxes, float32 (..., channels)."""
-
-    minimum: np.ndarray
-    maximum: np.ndarray
-    mean: np.ndarray | None
-
-
 class Within(NamedTuple):
     """Trees within the finest boxes: their cost, infinite where there is none, and leaf visits."""
 
@@ -54,14 +48,14 @@ class Level:
     Arrays are (n, 2^a, 2^b, 2^c).
     """
 
-    boxes: Boxes
+    boxes: Cells
     cost: np.ndarray
     visits: np.ndarray
     split: np.ndarray  # axis 0 = z, 1 = y, 2 = x, or LEAF, or DEEPER
 
 
 def weigh(
-    finest: Boxes, edges: list[np.ndarray], depths: Key, costs: Costs, within: Within | None = None
+    finest: Cells, edges: list[np.ndarray], depths: Key, costs: Costs, within: Within | None = None
 ) -> dict[Key, Level]:
     """The cheapest tree over every box of n lattices of 2^depths cells.
 
@@ -69,10 +63,11 @@ def weigh(
     edges : along z, y, x the world positions of the cells' planes, float64 (n or 1, 2^d + 1).
     """
     levels: dict[Key, Level] = {}
-    for key in sorted(product(*(range(d + 1) for d in depths)), key=sum, reverse=True):
+    for halvings in sorted(product(*(range(d + 1) for d in depths)), key=sum, reverse=True):
+        key = triple(halvings)
         widths = [_widths(e, k, d) for e, k, d in zip(edges, key, depths, strict=True)]
         halves = {
-            axis: levels[tuple(k + (a == axis) for a, k in enumerate(key))]
+            axis: levels[triple(k + (a == axis) for a, k in enumerate(key))]
             for axis in range(3)
             if key[axis] < depths[axis]
         }
@@ -102,21 +97,21 @@ def _along(widths: np.ndarray, axis: int) -> np.ndarray:
     return widths.reshape([len(widths), *(-1 if a == axis else 1 for a in range(3))])
 
 
-def _merged(boxes: Boxes, axis: int, widths: np.ndarray) -> Boxes:
-    """Boxes of twice the length along an axis, where those of `boxes` have the given widths."""
+def _merged(boxes: Cells, axis: int, widths: np.ndarray) -> Cells:
+    """Cells of twice the length along an axis, where those of `boxes` have the given widths."""
     low = np.minimum(*_pairs(boxes.minimum, axis))
     high = np.maximum(*_pairs(boxes.maximum, axis))
     if boxes.mean is None:
-        return Boxes(low, high, None)
+        return Cells(low, high, None)
     near, far = _pairs(boxes.mean, axis)
     whole = widths[:, ::2] + widths[:, 1::2]
     share = np.divide(widths[:, 1::2], whole, out=np.zeros_like(whole), where=whole > 0).astype(np.float32)
     # never beyond the two means, also after rounding: a constant box keeps its value
-    return Boxes(low, high, near + (far - near) * _along(share, axis)[..., None])
+    return Cells(low, high, near + (far - near) * _along(share, axis)[..., None])
 
 
 def _cheapest(
-    boxes: Boxes,
+    boxes: Cells,
     widths: list[np.ndarray],
     halves: dict[int, Level],
     within: Within | None,

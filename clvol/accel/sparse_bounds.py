@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from clvol.accel.bounds import Bounds, slackened
+from clvol.accel.cells import Cells
+from clvol.base.types import triple
 from clvol.volumes.brick_samples import BOUND_CELLS
 from clvol.volumes.sparse_places import BRICK_CELLS
 from clvol.volumes.tree import (
@@ -34,18 +36,6 @@ if TYPE_CHECKING:
 
 _CHUNK = 1024
 _CORNERS = np.array(list(np.ndindex(2, 2, 2)))
-
-
-class Cells(NamedTuple):
-    """Extrema and perhaps means of cells, float32 (..., channels).  Beyond the lattice: infinity, 0, 0."""
-
-    minimum: np.ndarray
-    maximum: np.ndarray
-    mean: np.ndarray | None
-
-    def at(self, index: object) -> Cells:
-        """Some of them."""
-        return Cells(*(None if part is None else part[index] for part in self))
 
 
 class BoundsTier(NamedTuple):
@@ -100,7 +90,7 @@ class SparseBounds:
     def coarser(self) -> SparseBounds:
         """The same over cells of twice the edge; in a mean every cell that it merges counts the same."""
         blocks, _ = unique_places(self.blocks // 2)
-        shape = tuple(-(-n // 2) for n in self.shape)
+        shape = triple(-(-n // 2) for n in self.shape)
         merged = _merged(self.inside, _sides(self.blocks, self.shape))
         row = rows_of(keys(self.blocks), keys(2 * blocks[:, None] + _CORNERS))
         parts = _like(self.inside, len(blocks))
@@ -110,10 +100,9 @@ class SparseBounds:
             found = row[:, number] >= 0
             first = (2 * blocks + corner) * NODE_EDGE * int(self.cell_size) // BRICK_CELLS
             fill = self._constants(first)
-            for part, own, value in zip(parts, merged, fill, strict=True):
-                if part is not None:
-                    part[at] = value[:, None, None, None]
-                    part[at][found] = own[row[found, number]]
+            for part, own, value in zip(parts.arrays(), merged.arrays(), fill.arrays(), strict=True):
+                part[at] = value[:, None, None, None]
+                part[at][found] = own[row[found, number]]
         inside = _masked(parts, _sides(blocks, shape))
         return SparseBounds(blocks, inside, shape[::-1], 2 * self.cell_size, self.constant)
 
@@ -151,13 +140,11 @@ class SparseBounds:
         cells = _like(self.inside, len(tier.nodes))
         for rows, places in entry_places(tier.nodes):
             fill = self._constants(places * edge * int(self.cell_size) // BRICK_CELLS)
-            for part, value in zip(cells, fill, strict=True):
-                if part is not None:
-                    part[rows] = value
+            for part, value in zip(cells.arrays(), fill.arrays(), strict=True):
+                part[rows] = value
         found = tier.below >= 0
-        for part, own in zip(cells, lower.summary(), strict=True):
-            if part is not None:
-                part[found] = own[tier.below[found]]
+        for part, own in zip(cells.arrays(), lower.summary().arrays(), strict=True):
+            part[found] = own[tier.below[found]]
         return BoundsTier(tier, _masked(cells, sides), sides, edge)
 
     def _constants(self, bricks: np.ndarray) -> Cells:
@@ -168,7 +155,7 @@ class SparseBounds:
 
 def sparse_bounds(bricks: BrickTree, means: bool) -> SparseBounds:
     """Bounds with slack (clvol.accel.bounds) over the halves of a tree's bricks, with means if wanted."""
-    shape = tuple(2 * n for n in bricks.shape)
+    shape = triple(2 * n for n in bricks.shape)
     last = (np.array(shape) - 1) // NODE_EDGE
     reach = [np.clip((2 * bricks.places + offset) // NODE_EDGE, 0, last) for offset in 3 * _CORNERS - 1]
     blocks, _ = unique_places(np.concatenate([np.zeros((1, 3), np.int64), *reach]))
@@ -177,9 +164,8 @@ def sparse_bounds(bricks: BrickTree, means: bool) -> SparseBounds:
     for first in range(0, len(blocks), _CHUNK):
         rows = slice(first, first + _CHUNK)
         own = _slack_inside(bricks, halves, blocks[rows], max(shape) * BOUND_CELLS)
-        for part, values in zip(inside, own, strict=True):
-            if part is not None:
-                part[rows] = values
+        for part, values in zip(inside.arrays(), own.arrays(), strict=True):
+            part[rows] = values
 
     def constant(places: np.ndarray) -> np.ndarray:
         return bricks.standing.constant(places)[..., None]
@@ -194,20 +180,17 @@ def from_dense(bounds: Bounds) -> SparseBounds:
     count = tuple(-(-n // NODE_EDGE) for n in shape)
     blocks = np.stack(np.meshgrid(*map(np.arange, count), indexing="ij"), axis=-1).reshape(-1, 3)
     pad = [(0, NODE_EDGE * c - n) for c, n in zip(count, shape, strict=True)] + [(0, 0)]
-    parts = []
-    for values in (bounds.minimum, bounds.maximum, bounds.mean):
-        if values is None:
-            parts.append(None)
-            continue
-        split = np.pad(values, pad).reshape(*(n for c in count for n in (c, NODE_EDGE)), values.shape[-1])
-        split = split.transpose(0, 2, 4, 1, 3, 5, 6)
-        parts.append(split.reshape(-1, *(NODE_EDGE,) * 3, values.shape[-1]))
+
+    def split(values: np.ndarray) -> np.ndarray:
+        places = np.pad(values, pad).reshape(*(n for c in count for n in (c, NODE_EDGE)), values.shape[-1])
+        return places.transpose(0, 2, 4, 1, 3, 5, 6).reshape(-1, *(NODE_EDGE,) * 3, values.shape[-1])
+
     channels = bounds.maximum.shape[-1]
 
     def constant(places: np.ndarray) -> np.ndarray:
         return np.zeros((*places.shape[:-1], channels), np.float32)
 
-    inside = _masked(Cells(*parts), _sides(blocks, shape))
+    inside = _masked(Cells(bounds.minimum, bounds.maximum, bounds.mean).each(split), _sides(blocks, shape))
     return SparseBounds(blocks, inside, bounds.cells, bounds.cell_size, constant)
 
 
@@ -218,21 +201,20 @@ def _slack_inside(bricks: BrickTree, halves: Cells, blocks: np.ndarray, size: in
     places = np.clip(per_block * blocks[:, None, None, None] + around, 0, np.array(bricks.shape) - 1)
     row = bricks.find(places)
     constant = bricks.standing.constant(places)[..., None, None, None, None]
-    wide = []
-    for values in halves:
-        if values is None:
-            wide.append(None)
-            continue
+
+    def spread(values: np.ndarray) -> np.ndarray:
         cells = np.broadcast_to(constant, (*row.shape, *values.shape[1:])).copy()
         cells[row >= 0] = values[row[row >= 0]]
         edge = 2 * row.shape[1]
         cells = cells.transpose(0, 1, 4, 2, 5, 3, 6, 7).reshape(len(blocks), edge, edge, edge, -1)
-        wide.append(cells[:, 1:-1, 1:-1, 1:-1])
+        return cells[:, 1:-1, 1:-1, 1:-1]
+
+    wide = halves.each(spread)
     # at the lattice's border the clipped place repeats the border's own two cells: no other extremum
-    least, most = _around(wide[0], np.minimum), _around(wide[1], np.maximum)
-    inner = np.s_[:, 1:-1, 1:-1, 1:-1]
-    low, high = slackened(wide[0][inner], wide[1][inner], least, most, size)
-    return Cells(low, high, None if wide[2] is None else wide[2][inner])
+    least, most = _around(wide.minimum, np.minimum), _around(wide.maximum, np.maximum)
+    inner = wide.at(np.s_[:, 1:-1, 1:-1, 1:-1])
+    low, high = slackened(inner.minimum, inner.maximum, least, most, size)
+    return Cells(low, high, inner.mean)
 
 
 def _around(values: np.ndarray, combine: np.ufunc) -> np.ndarray:
@@ -246,10 +228,8 @@ def _around(values: np.ndarray, combine: np.ufunc) -> np.ndarray:
 
 def _like(cells: Cells, count: int) -> Cells:
     """Room for as many nodes."""
-    edge, channels = (NODE_EDGE,) * 3, cells.maximum.shape[-1]
-    return Cells(
-        *(None if part is None else np.empty((count, *edge, channels), np.float32) for part in cells)
-    )
+    shape = (count, *(NODE_EDGE,) * 3, cells.maximum.shape[-1])
+    return cells.each(lambda _: np.empty(shape, np.float32))
 
 
 def _sides(nodes: np.ndarray, shape: tuple[int, ...], edge: int = 1) -> np.ndarray:
@@ -267,7 +247,8 @@ def _axes(sides: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _product(sides: np.ndarray) -> np.ndarray:
     """Numbers along each axis, (3, n, 8), multiplied: (n, 8, 8, 8)."""
     z, y, x = _axes(sides)
-    return z * y * x
+    product: np.ndarray = z * y * x
+    return product
 
 
 def _masked(cells: Cells, sides: np.ndarray) -> Cells:

@@ -5,12 +5,15 @@ An entry of a node takes 4 bytes, a cell 4 more for its bound, and 4 for each ch
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from clvol.accel.sparse_bounds import Cells, SparseBounds
+from clvol.accel.cells import Cells
 from clvol.volumes.tree import Tier, device_nodes
+
+if TYPE_CHECKING:
+    from clvol.accel.sparse_bounds import SparseBounds
 
 
 class TreeGrid(NamedTuple):
@@ -36,6 +39,5 @@ def tree_grid(bounds: SparseBounds) -> TreeGrid:
         return found
 
     links = device_nodes([tier.tier for tier in bounds.tiers], rows)
-    parts = [tier.cells.at(leaf) for tier, leaf in zip(bounds.tiers, leaves, strict=True)]
-    cells = Cells(*(None if part[0] is None else np.concatenate(part) for part in zip(*parts, strict=True)))
+    cells = Cells.joined(tier.cells.at(leaf) for tier, leaf in zip(bounds.tiers, leaves, strict=True))
     return TreeGrid(links, len(leaves), cells)

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.accel.bounds import Bounds
+from clvol.accel.cells import Cells
 from clvol.accel.kdtree import LEAF_BITS, KdTree, build_kdtree, grow, tree_lattice
-from clvol.accel.kdtree_costs import Boxes, Costs, Key, Within, weigh
+from clvol.accel.kdtree_costs import Costs, Key, Within, weigh
 from clvol.volumes.tree import NODE_EDGE
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ class _Builder:
     def __init__(self, bounds: SparseBounds, extent: np.ndarray, costs: Costs) -> None:
         self.shape, self.extent, self.costs = bounds.shape, extent, costs
         self.nodes: list[np.ndarray] = []
-        self.leaves: list[Boxes] = []
+        self.leaves: list[Cells] = []
         self.node_count = self.leaf_count = 0
         self.roots, self.cost, self.visits = np.empty((0, 2), np.uint32), np.empty(0), np.empty(0)
 
@@ -81,7 +82,7 @@ class _Builder:
         if tier.edge > 1:
             within = Within(np.append(self.cost, np.inf)[below], np.append(self.visits, 0.0)[below])
             roots = np.append(self.roots, np.zeros((1, 2), np.uint32), axis=0)[below]
-        levels = weigh(Boxes(*tier.cells.at(rows)), edges, _DEPTHS, self.costs, within)
+        levels = weigh(tier.cells.at(rows), edges, _DEPTHS, self.costs, within)
         scale = self.costs.majorant_scale
         grown = grow(levels, _DEPTHS, scale, origins, tier.edge, roots, self.node_count, self.leaf_count)
         self.nodes.append(grown.nodes)
@@ -105,11 +106,10 @@ class _Builder:
         row = found[leaf, 1].astype(np.int64)
         found[leaf, 1] = np.arange(len(row))
         found[~leaf, 1] = 1 + 2 * np.arange(np.count_nonzero(~leaf))  # breadth first, the root is number 0
-        low, high, mean = (
-            None if part[0] is None else np.concatenate(part)[row] for part in zip(*self.leaves, strict=True)
-        )
+        low, high, mean = Cells.joined(self.leaves).at(row)
         return KdTree(found, low, high, mean, float(self.cost[0]), len(row), depth)
 
 
 def _is_leaf(nodes: np.ndarray) -> np.ndarray:
-    return (nodes[:, 0] & LEAF_BITS) == LEAF_BITS
+    leaf: np.ndarray = (nodes[:, 0] & LEAF_BITS) == LEAF_BITS
+    return leaf
