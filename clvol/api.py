@@ -57,35 +57,51 @@ def render(
 
     Parameters
     ----------
-    scene : from `load_file` or `load_dict`.
-    spp, seed : samples per pixel and 64-bit seed; default to the scene's.
-    technique, transmittance, majorant, lookup, absorption, probability, control, sampler : names from
-        `clvol.planning.registry`; "auto" takes the scene's own choice, else follows fixed rules, so that
-        the same seed gives the same bits; technique "auto:pilot" has a short measured pilot choose technique,
-        transmittance and majorant, where they are left at auto (`result.metadata["repeat"]` says what).
-    majorant_scale : multiplies every bound of the density, for experiments; below 1 only for techniques and
+    scene
+        From `load_file` or `load_dict`.
+    spp, seed
+        Samples per pixel and 64-bit seed. They default to the scene's.
+    technique, transmittance, majorant, lookup, absorption, probability, control, sampler
+        Names from `clvol.planning.registry`. "auto" takes the scene's own choice, else follows fixed rules,
+        so that the same seed gives the same bits. Technique "auto:pilot" has a short measured pilot choose
+        technique, transmittance and majorant, where they are left at "auto". ``result.metadata["repeat"]``
+        says what it chose.
+    majorant_scale
+        Multiplies every bound of the density, for experiments. A factor below 1 is only for techniques and
         transmittances that stay unbiased there.
-    step : world length of a step of ray marching; the edge of a voxel by default.
-    aov : names from `registry.AOVS` to add to `result.aovs`: means per sample ("largest_weight": maxima).
-    time_limit : seconds after which no new pass of samples is begun; alone it replaces `spp`.  Passes begun
-        are finished, unless paths go on for more than 10 seconds (30 where no pass is finished yet).
-    target_error : mean relative standard error (`Result.noise`) at which the render ends, judged by a pilot
-        that is not in the picture; pixels get samples by their noise.  `spp` then is the most on the mean.
-    device : index or part of the name of an OpenCL device (see `clvol devices`).
-    progress : True for a progress bar, or a callable that receives `clvol.base.progress.Progress` records.
-    samples : (first, count): render only these of the samples; results of disjoint ranges `merge`.
-    pool : paths in flight, for measurements; the picture does not depend on it.
+    step
+        World length of a step of ray marching. The default is the edge of a voxel.
+    aov
+        Names from `clvol.planning.registry.AOVS` to add to ``result.aovs``. They are means per sample
+        ("largest_weight": maxima).
+    time_limit
+        Seconds after which no new pass of samples is begun. Alone it replaces `spp`. Passes begun are
+        finished, unless paths go on for more than 10 seconds (30 where no pass is finished yet).
+    target_error
+        Mean relative standard error (`Result.noise`) at which the render ends. A pilot that is not in the
+        picture judges it, and pixels get samples by their noise. `spp` then is the most on the mean.
+    device
+        Index or part of the name of an OpenCL device (see `clvol devices`).
+    progress
+        True for a progress bar, or a callable that receives `clvol.base.progress.Progress` records.
+    samples
+        (first, count): render only these of the samples. Results of disjoint ranges `merge`.
+    pool
+        Paths in flight, for measurements. The picture does not depend on it.
 
     Returns
     -------
-    Result.  Ctrl-C finishes the paths in flight and returns the picture so far, with
-    ``stats["interrupted"]`` set; a second Ctrl-C does not wait for them and keeps the samples that every
-    pixel has; a third raises KeyboardInterrupt.
+    Result
+        The picture and what is known of it. Ctrl-C finishes the paths in flight and returns the picture so
+        far, with ``stats["interrupted"]`` set. A second Ctrl-C does not wait for them and keeps the samples
+        that every pixel has. A third raises KeyboardInterrupt.
 
     Raises
     ------
-    OptionError, SceneError, VolumeError, DeviceError : a choice, scene, volume or device that won't do.
-    RenderError : the render was to end, and no pass of samples ever did.
+    OptionError, SceneError, VolumeError, DeviceError
+        A choice, scene, volume or device that won't do.
+    RenderError
+        The render was to end, and no pass of samples ever did.
     """
     if not isinstance(scene, Scene):
         raise OptionError(

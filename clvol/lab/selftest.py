@@ -169,21 +169,35 @@ def selftest(
 
     Parameters
     ----------
-    scene : from `load_file` or `load_dict`; its film is made smaller, all else is as it is.
-    quick : a smaller film and fewer combinations, about a minute with the kernels built.
-    seconds : of rendering, kernels apart; 120, or 20 if quick.
-    alpha : probability that any combination of a sound scene is accused.
-    spp : samples per pixel of each of `LEAST_ROUNDS` rounds, instead of what `seconds` allow.
-    progress : called with what is done, the steps of it done, and how many there are.
+    scene
+        From `load_file` or `load_dict`. Its film is made smaller. All else is as it is.
+    quick
+        A smaller film and fewer combinations: about a minute with the kernels built.
+    seconds
+        Of rendering, without the builds of kernels. The default is 120, or 20 if quick.
+    alpha
+        Probability that any combination of a sound scene is accused.
+    seed
+        All renders have seeds of their own, which follow from it.
+    device
+        Index or part of the name of an OpenCL device.
+    spp
+        Samples per pixel of each of `LEAST_ROUNDS` rounds, instead of what `seconds` allow.
+    progress
+        Called with what is done, the steps of it done, and how many there are.
 
     Returns
     -------
-    SelfTest.  Ctrl-C after two rounds or more ends them, and those that are complete are judged.
+    SelfTest
+        What was tested and the verdict. Ctrl-C after two rounds or more ends them, and those that are
+        complete are judged.
 
     Raises
     ------
-    OptionError, SceneError, VolumeError, DeviceError : an alpha, scene, volume or device that won't do.
-    KeyboardInterrupt : Ctrl-C before two rounds were complete.
+    OptionError, SceneError, VolumeError, DeviceError
+        An alpha, scene, volume or device that won't do.
+    KeyboardInterrupt
+        Ctrl-C before two rounds were complete.
     """
     if not isinstance(scene, Scene):
         raise OptionError(f"selftest takes a Scene, not {type(scene).__name__}", hint="use load_file")

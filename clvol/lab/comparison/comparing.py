@@ -52,30 +52,45 @@ def compare(
 
     Parameters
     ----------
-    scene : from `load_file` or `load_dict`.
-    time_limit : about the seconds that each combination renders for, over all its rounds; 10 by default, and
-        with sampler sobol the nearest that a power of two of samples allows.  The reference takes about ten
-        times as long as one combination, unless it is given; renders with fewer samples a third as long.
-    spp : samples per pixel of one round instead, for all alike.
-    rounds : independent renders of each combination, at least 4.
-    baseline : label of the combination that efficiencies are relative to; the first by default.
-    reference : an .exr to compare with, with the variance that `Result.save` writes; else one is rendered.
-    reference_spp : samples per pixel of the reference, in all.
-    step : world length of a step, for the combinations that march.
-    seed : of the first render; every render has one of its own.  The scene's by default.
-    device : index or part of the name of an OpenCL device.
-    progress : True for a progress bar, or a callable (seconds done, seconds expected, what is being done).
-    **families : names by family of `clvol.planning.registry`, as ``techniques=["delta", "spectral"]`` or
-        ``majorant="grid,kdtree"``; all combinations are measured.
+    scene
+        From `load_file` or `load_dict`.
+    time_limit
+        About the seconds that each combination renders for, over all its rounds. The default is 10. With
+        sampler sobol it is the nearest that a power of two of samples allows. The reference takes about ten
+        times as long as one combination, unless it is given. Renders with fewer samples take a third as
+        long.
+    spp
+        Samples per pixel of one round instead, the same for all.
+    rounds
+        Independent renders of each combination, at least 4.
+    baseline
+        Label of the combination that efficiencies are relative to. The default is the first.
+    reference
+        An .exr to compare with, with the variance that `Result.save` writes. Otherwise one is rendered.
+    reference_spp
+        Samples per pixel of the reference, in all.
+    step
+        World length of a step, for the combinations that march.
+    seed
+        Of the first render. Every render has one of its own. The default is the scene's.
+    device
+        Index or part of the name of an OpenCL device.
+    progress
+        True for a progress bar, or a callable (seconds done, seconds expected, what is being done).
+    **families
+        Names by family of `clvol.planning.registry`, as ``techniques=["delta", "spectral"]`` or
+        ``majorant="grid,kdtree"``. All combinations are measured.
 
     Returns
     -------
-    Comparison.  Ctrl-C ends the rounds early and keeps the complete ones, at least 4; else KeyboardInterrupt.
+    Comparison
+        The figures of all combinations. Ctrl-C ends the rounds early and keeps the complete ones, if they
+        are at least 4. Otherwise it raises KeyboardInterrupt.
 
     Raises
     ------
-    OptionError, SceneError, VolumeError, DeviceError : what won't do, and why; a single combination without a
-        reference is nothing to compare.
+    OptionError, SceneError, VolumeError, DeviceError
+        What won't do, and why. A single combination without a reference is nothing to compare.
     """
     if not isinstance(scene, Scene):
         raise OptionError(

@@ -52,19 +52,37 @@ def trace_ray(
 
     Parameters
     ----------
-    scene : from `load_file` or `load_dict`.
-    x, y : pixel of the picture, from the left and from the top.
-    techniques, transmittances : names of `clvol.planning.registry`; by default three that differ, and ratio
-        tracking with and without a control.
-    channel : 0, 1 or 2 for red, green or blue; by default the one that the ray's medium attenuates most.
-    walks : how many to show event by event.  many : how many make up densities and means.
-    seed : 64-bit; the scene's by default.
-    progress : called with (steps done, steps in all, what is next).
-    choices : majorant, lookup, absorption, probability, control, majorant_scale, step, as for `render`.
+    scene
+        From `load_file` or `load_dict`.
+    x, y
+        Pixel of the picture, from the left and from the top.
+    techniques, transmittances
+        Names of `clvol.planning.registry`. The default is three techniques that differ, and ratio tracking
+        with and without a control.
+    channel
+        0, 1 or 2 for red, green or blue. The default is the one that the ray's medium attenuates most.
+    walks
+        How many to show event by event.
+    many
+        How many make up densities and means.
+    seed
+        64 bits. The default is the scene's.
+    device
+        Index or part of the name of an OpenCL device.
+    progress
+        Called with (steps done, steps in all, what is next).
+    **choices
+        majorant, lookup, absorption, probability, control, majorant_scale and step, as for `render`.
+
+    Returns
+    -------
+    RayView
+        The ray and what walks did along it.
 
     Raises
     ------
-    OptionError : a pixel outside the picture, a ray that meets no medium, an impossible choice.
+    OptionError
+        A pixel outside the picture, a ray that meets no medium, an impossible choice.
     """
     if not isinstance(scene, Scene):
         raise OptionError(
