@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from places import ROOT, SCENES
 
+import clvol
 from clvol.planning.registry import AOVS, FAMILIES
 from clvol.scene.loader import PLUGINS
 
@@ -73,9 +74,21 @@ def test_every_link_leads_somewhere(page: Path) -> None:
             assert fragment in {anchor(heading) for heading in headings}, target
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_list_is_one_to_markdown_too(page: Path) -> None:
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    joined = re.findall(r"^(?! |-|\d+\.|#|\|).+\n(?:-|1\.) .*", text, re.MULTILINE)
+    assert not joined, "a list begins after an empty line"
+
+
 def test_every_page_is_in_the_navigation() -> None:
     navigation = re.findall(r": ([\w-]+\.md)$", (ROOT / "mkdocs.yml").read_text("utf-8"), re.MULTILINE)
     assert sorted(navigation) == sorted(page.name for page in DOCS.glob("*.md"))
+
+
+def test_the_reference_has_every_public_name() -> None:
+    described = re.findall(r"^::: .*\b(\w+)$", text_of("api.md"), re.MULTILINE)
+    assert set(clvol.__all__) - set(described) == {"__version__"}
 
 
 def test_every_method_that_is_cited_has_its_heading() -> None:
