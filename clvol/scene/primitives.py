@@ -1,4 +1,4 @@
-"""The cube and the rectangle as triangles, with Mitsuba's texture coordinates."""
+"""Which shapes are met in closed form; the cube and the rectangle as triangles, with Mitsuba's uv."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ from functools import cache
 
 import numpy as np
 
+from clvol.layout import ENUMS
 from clvol.scene.records import Mesh, Shape
 
+QUADRICS = tuple(map(str.lower, ENUMS["QUADRIC"]))
+"""Kinds of shape that stay what they are on the device; all others are triangles there."""
 _CUBE = np.array(  # each face counter-clockwise from its corner at (u, v) = (0, 1), towards (1, 1)
     [
         [(1, -1, -1), (1, -1, 1), (-1, -1, 1), (-1, -1, -1)],

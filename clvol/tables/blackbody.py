@@ -8,7 +8,7 @@ import numpy as np
 
 from clvol.layout import BLACKBODY_BINS, BLACKBODY_MIDDLE_KELVIN
 from clvol.scene.spectra import XYZ_TO_SRGB, observer
-from clvol.tables.environment import luminance
+from clvol.tables.colours import luminance
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -14,7 +14,7 @@ import numpy as np
 from clvol.errors import SceneError
 from clvol.scene import records
 from clvol.scene.boundaries import Boundaries, is_clipped
-from clvol.scene.primitives import canonical_mesh
+from clvol.scene.primitives import mesh_of
 from clvol.tables.camera import camera_rays
 
 log = logging.getLogger("clvol")
@@ -103,7 +103,7 @@ def starts_inside(shape: records.Shape, starts: np.ndarray, towards: np.ndarray)
     elif shape.kind in ("sphere", "cylinder"):
         t, outwards = _round(shape.kind, o, d)
     else:
-        t, outwards = _triangles(shape.mesh if shape.kind == "mesh" else canonical_mesh(shape.kind), o, d)
+        t, outwards = _triangles(mesh_of(shape), o, d)
     return np.isfinite(t) & (outwards != shape.flip_normals)
 
 

@@ -5,18 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from clvol.base.rows import bands
-
-
-def luminance(rgb: np.ndarray) -> np.ndarray:
-    """Rec. 709 luminance of (..., 3) linear sRGB."""
-    return rgb @ np.array([0.212671, 0.715160, 0.072169])
-
-
-def mean_luminance(radiance: np.ndarray) -> float:
-    """Mean luminance of a picture, float (h, w, 3)."""
-    height, width, _ = radiance.shape
-    total = sum(float(luminance(radiance[rows]).sum()) for rows in bands(height, width))
-    return total / (height * width)
+from clvol.tables.colours import luminance
 
 
 def envmap_distribution(radiance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

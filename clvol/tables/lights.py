@@ -5,30 +5,22 @@ Pure functions from records to arrays.  An environment is emitter 0; next-event 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from clvol import layout
 from clvol.scene import records
-from clvol.tables.environment import envmap_distribution, luminance, mean_luminance
+from clvol.scene.primitives import QUADRICS
+from clvol.tables.affine import rotation_3x4
+from clvol.tables.colours import luminance, mean_luminance, rgb
+from clvol.tables.environment import envmap_distribution
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-QUADRICS = ("sphere", "disk", "cylinder")
-"""Kinds of shape that stay what they are on the device; all others are triangles there."""
+    from clvol.tables.surfaces import Surfaces
 
 RANDOM_STEPS = 2.0**32
 """Values that a random number of the device takes."""
-
-
-class Surfaces(Protocol):
-    """A scene's surfaces as the device numbers them."""
-
-    shapes: Sequence[records.Shape]  # in the order of the SHAPE records
-    vertices: np.ndarray  # float32 (n, 3), world space, relative to the scene's centre
-    faces: np.ndarray  # uint32 (m, 4): three vertices and the number of the shape
 
 
 class LightTable(NamedTuple):
@@ -148,8 +140,8 @@ def envmap_arrays(emitter: records.EnvmapEmitter) -> dict[str, np.ndarray]:
     """What the device knows of an environment map, by argument name: its record, texels and distribution."""
     record = np.zeros(1, layout.ENVMAP)
     rotation = emitter.to_world[:3, :3]
-    record["world_from_env"] = np.column_stack([rotation, np.zeros(3)]).reshape(12)
-    record["env_from_world"] = np.column_stack([np.linalg.inv(rotation), np.zeros(3)]).reshape(12)
+    record["world_from_env"] = rotation_3x4(rotation)
+    record["env_from_world"] = rotation_3x4(np.linalg.inv(rotation))
     height, width, _ = emitter.radiance.shape
     record["size"] = width, height
     marginal, conditional = envmap_distribution(emitter.radiance)
@@ -165,18 +157,14 @@ def _is_environment(emitter: records.Emitter) -> bool:
     return isinstance(emitter, (records.ConstantEmitter, records.EnvmapEmitter))
 
 
-def _rgb(value: tuple[float, ...]) -> np.ndarray:
-    return np.broadcast_to(np.asarray(value, np.float64), 3)
-
-
 def _describe_area(record: np.void, shape: records.Shape, number: int) -> float:
     """Fill in an area light and return its power; a mesh's area is there already."""
     if shape.kind in QUADRICS:
         record["area"] = quadric_area(shape)
     record["kind"] = layout.enum("EMITTER", "area")
     record["shape"] = number
-    record["value"] = _rgb(shape.emission)
-    return np.pi * float(record["area"]) * float(luminance(_rgb(shape.emission)))
+    record["value"] = rgb(shape.emission)
+    return np.pi * float(record["area"]) * float(luminance(rgb(shape.emission)))
 
 
 def _describe_emitter(record: np.void, emitter: records.Emitter, centre: np.ndarray, radius: float) -> float:
@@ -201,5 +189,5 @@ def _describe_emitter(record: np.void, emitter: records.Emitter, centre: np.ndar
             record["position"] = emitter.to_world[:3, 3] - centre
             record["cutoff_angle"], record["beam_width"] = cutoff, beam
     record["kind"] = layout.enum("EMITTER", type(emitter).__name__.removesuffix("Emitter"))
-    record["value"] = _rgb(value)
-    return extent * float(luminance(_rgb(value)))
+    record["value"] = rgb(value)
+    return extent * float(luminance(rgb(value)))

@@ -14,8 +14,9 @@ import numpy as np
 from clvol import layout
 from clvol.scene import materials
 from clvol.scene.material_facts import Side, bsdf_sides, side_kind
-from clvol.scene.materials import Bitmap, Bsdf, Checkerboard, Spectrum, Texture
+from clvol.scene.materials import Bitmap, Bsdf, Checkerboard, Texture
 from clvol.tables.coat import MIN_ALPHA, coat_table, diffuse_reflectance
+from clvol.tables.colours import rgb
 from clvol.tables.textures import TextureTable, mean_color
 
 if TYPE_CHECKING:
@@ -104,7 +105,7 @@ def _record(side: Side, textures: TextureTable, tables: list[np.ndarray]) -> np.
         _set_color(record, field, color, textures)
     record["ior"] = getattr(bsdf, "int_ior", 1.0) / getattr(bsdf, "ext_ior", 1.0)
     if isinstance(bsdf, materials.Conductor | materials.RoughConductor):
-        record["eta"], record["k"] = (_rgb(value) for value in (bsdf.eta, bsdf.k))
+        record["eta"], record["k"] = (rgb(value) for value in (bsdf.eta, bsdf.k))
     if kind.startswith("ROUGH"):
         record["distribution"] = layout.enum("DISTRIBUTION", bsdf.distribution)
         both = getattr(bsdf, "alpha", None)
@@ -135,8 +136,4 @@ def _set_color(record: np.ndarray, field: str, color: Texture, textures: Texture
     if isinstance(color, Bitmap | Checkerboard):
         record[f"{field}_texture"] = textures.add(color)
     else:
-        record[field], record[f"{field}_texture"] = _rgb(color), -1
-
-
-def _rgb(color: Spectrum) -> np.ndarray:
-    return np.broadcast_to(np.asarray(color, np.float32), 3)
+        record[field], record[f"{field}_texture"] = rgb(color), -1

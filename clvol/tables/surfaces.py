@@ -19,15 +19,13 @@ from clvol.scene.boundaries import Boundaries, shape_bounds
 from clvol.scene.material_facts import is_transmissive, passes_light
 from clvol.scene.mesh import mesh_flaws
 from clvol.scene.orientation import facing_outwards
-from clvol.scene.primitives import canonical_mesh
+from clvol.scene.primitives import QUADRICS, mesh_of
+from clvol.tables.affine import centred, rows_3x4
 
 if TYPE_CHECKING:
     from clvol.scene import records
 
 log = logging.getLogger("clvol")
-
-QUADRICS = ("sphere", "disk", "cylinder")
-"""Kinds of shape that are met as quadrics; a "cube" and a "rectangle" are triangles."""
 
 _CHUNK = 1 << 17
 INWARDS = "triangles that face inwards"
@@ -86,16 +84,15 @@ def prepare_surfaces(scene: records.Scene, found: Boundaries, centre: np.ndarray
 
 def _maps(shape: records.Shape, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """World from local and back, as 12 floats each, relative to the centre."""
-    to_world = shape.to_world.copy()
-    to_world[:3, 3] -= centre
-    return tuple(m[:3].astype(np.float32).reshape(12) for m in (to_world, np.linalg.inv(to_world)))
+    to_world = centred(shape.to_world, centre)
+    return rows_3x4(to_world), rows_3x4(np.linalg.inv(to_world))
 
 
 def _triangles(
     meshes: list[tuple[int, records.Shape]], table: np.ndarray, centre: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray | None]:
     """Vertices, faces, normals and uvs of all meshes in one; writes into `table` who has the last two."""
-    found = [(n, s, canonical_mesh(s.kind) if s.kind != "mesh" else s.mesh) for n, s in meshes]
+    found = [(n, s, mesh_of(s)) for n, s in meshes]
     total = sum(len(m.vertices) for _, _, m in found)
     vertices = np.empty((total, 3), np.float32)
     faces = np.empty((sum(len(m.faces) for _, _, m in found), 4), np.uint32)
@@ -164,7 +161,7 @@ def _outward(shape: records.Shape) -> records.Shape:
             if turned:
                 log.warning("%s bounds a medium, but has %s: they are turned", name, INWARDS)
                 shape = replace(shape, mesh=mesh)
-        flaws = mesh_flaws(canonical_mesh(shape.kind) if shape.kind != "mesh" else shape.mesh)
+        flaws = mesh_flaws(mesh_of(shape))
         flaws = _turned(flaws, shape.flip_normals)
     for flaw in flaws:
         log.warning("%s bounds a medium, but %s: the medium may be missing or too large there", name, flaw)

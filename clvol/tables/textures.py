@@ -7,15 +7,13 @@ import numpy as np
 from clvol import layout
 from clvol.base.rows import bands
 from clvol.scene.materials import Bitmap, Checkerboard, Texture
-
-LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
-"""Of linear sRGB."""
+from clvol.tables.colours import luminance
 
 
 def mean_color(texture: Texture) -> float:
     """Mean of a texture over its unit square and its channels; a bitmap's by luminance, as in Mitsuba."""
     if isinstance(texture, Bitmap):
-        return float(texture.pixels.mean((0, 1), dtype=np.float64) @ LUMINANCE)
+        return float(luminance(texture.pixels.mean((0, 1), dtype=np.float64)))
     if isinstance(texture, Checkerboard):
         return 0.5 * float(np.mean(texture.color0) + np.mean(texture.color1))
     return float(np.mean(texture))
@@ -68,7 +66,7 @@ class TextureTable:
             if as_number:
                 grey = np.empty_like(texels)
                 for rows in bands(len(texels), 1):
-                    grey[rows] = (texels[rows] @ LUMINANCE)[:, None]
+                    grey[rows] = luminance(texels[rows])[:, None]
                 texels = grey
             self.texels.append(texels)
             self._used += len(texels)

@@ -20,7 +20,7 @@ from clvol.scene.materials import (
     Mask,
     RoughDielectric,
 )
-from clvol.scene.primitives import canonical_mesh
+from clvol.scene.primitives import mesh_of
 from clvol.scene.records import (
     ConstantEmitter,
     DirectionalEmitter,
@@ -136,7 +136,7 @@ def found(shapes, lights=(SKY,), **more):
 
 
 def triangles_of(shape):
-    mesh = shape.mesh if shape.kind == "mesh" else canonical_mesh(shape.kind)
+    mesh = mesh_of(shape)
     corners = mesh.vertices.astype(float) @ shape.to_world[:3, :3].T + shape.to_world[:3, 3]
     faces = mesh.faces if np.linalg.det(shape.to_world[:3, :3]) > 0 else mesh.faces[:, ::-1]
     return corners[faces]  # outside stays outside in a mirror

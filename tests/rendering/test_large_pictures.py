@@ -11,9 +11,10 @@ import clvol
 from clvol.base import rows
 from clvol.base.image_reading import MAX_PIXELS
 from clvol.scene.materials import Bitmap
-from clvol.tables.environment import envmap_distribution, luminance, mean_luminance
+from clvol.tables.colours import LUMINANCE, luminance, mean_luminance
+from clvol.tables.environment import envmap_distribution
 from clvol.tables.lights import envmap_arrays
-from clvol.tables.textures import LUMINANCE, TextureTable
+from clvol.tables.textures import TextureTable
 
 
 def chunk(name, data):

@@ -6,7 +6,7 @@ import pytest
 from clvol.layout import BLACKBODY_BINS, BLACKBODY_MIDDLE_KELVIN
 from clvol.scene.spectra import XYZ_TO_SRGB, sampled_to_rgb
 from clvol.tables.blackbody import blackbody_rgb, blackbody_table
-from clvol.tables.environment import luminance
+from clvol.tables.colours import luminance
 
 LOCUS = [  # CIE 1931 2°: kelvin, x, y of the Planckian locus
     (2000, 0.5267, 0.4133),
