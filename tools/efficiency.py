@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from clvol.lab.statistics import bootstrap, round_variance
+
 
 @dataclass(frozen=True, eq=False)
 class Rounds:
@@ -38,7 +40,7 @@ class Rounds:
 
 def pixel_variance(rounds: Rounds) -> np.ndarray:
     """Unbiased variance of one sample: between rounds x spp, mean over channels; (height, width)."""
-    return rounds.images.astype(np.float64).var(axis=0, ddof=1).mean(axis=-1) * rounds.spp
+    return round_variance(rounds.images) * rounds.spp
 
 
 def image_mean(rounds: Rounds) -> tuple[float, float]:
@@ -70,19 +72,13 @@ def efficiency_ratio(ours: Rounds, theirs: Rounds, resamples: int = 1000) -> dic
     by_round = efficiencies(ours) / efficiencies(theirs)
     variances = np.stack([pixel_variance(theirs).ravel(), pixel_variance(ours).ravel()])
     times = (theirs.cpu / theirs.paths) / (ours.cpu / ours.paths)
-    random = np.random.default_rng(1)
-    drawn = np.empty(resamples)
-    for i in range(resamples):
+
+    def drawn(random: np.random.Generator) -> float:
         noise = variances[:, random.integers(variances.shape[1], size=variances.shape[1])].mean(axis=1)
-        drawn[i] = noise[0] / noise[1] * np.median(random.choice(times, len(times)))
-    low, high = np.quantile(drawn, [0.025, 0.975])
-    return {
-        "median": float(np.median(by_round)),
-        "least": float(by_round.min()),
-        "greatest": float(by_round.max()),
-        "low": float(low),
-        "high": float(high),
-    }
+        return noise[0] / noise[1] * np.median(random.choice(times, len(times)))
+
+    low, high = bootstrap(drawn, resamples)
+    return spread(by_round) | {"low": low, "high": high}
 
 
 def spread(values: list[float] | np.ndarray) -> dict[str, float]:

@@ -22,10 +22,11 @@ from rich.progress import track
 from clvol.cli.options import device_option
 from clvol.device.device import open_device
 from clvol.lab.candidates import Candidate, Relative, error, inverse_efficiency, relative_efficiency
-from clvol.lab.combinations import independent_seeds, unbiased
+from clvol.lab.combinations import unbiased
 from clvol.lab.pilot import CHOSEN, ROUNDS, Found, Pilot
 from clvol.lab.pilot import HOPELESS as SLOW
 from clvol.lab.quiet import quiet_renders
+from clvol.lab.seeds import independent_seeds
 from clvol.planning.choices import Choices
 from clvol.scene import load_file
 

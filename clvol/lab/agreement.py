@@ -20,6 +20,7 @@ import numpy as np
 from scipy.special import stdtr, stdtrit
 
 from clvol.errors import OptionError
+from clvol.lab.statistics import region_sums, regions
 
 POWER = 0.95
 """Probability with which `Agreement.smallest_bias` would have been seen."""
@@ -162,26 +163,13 @@ def _planes(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate([a, grey[0]], axis=-1), np.concatenate([b, grey[1]], axis=-1)
 
 
-def region_sums(plane: np.ndarray, edge: int) -> np.ndarray:
-    """Sums over squares of edge² pixels; (height, width, …) to (regions y, regions x, …)."""
-    rows = np.add.reduceat(plane, np.arange(0, plane.shape[0], edge), axis=0)
-    return np.add.reduceat(rows, np.arange(0, plane.shape[1], edge), axis=1)
-
-
 def _means(stack: np.ndarray, edge: int, largest: float) -> _Means:
     """Means of square regions of pixels, with the variance pooled over the pixels of each."""
     rounds, mean, variance = len(stack), stack.mean(axis=0), stack.var(axis=0, ddof=1)
-    pixels = region_sums(np.ones((*mean.shape[:2], 1)), edge)
-    doubt = region_sums(variance**2, edge) / (rounds - 1) / pixels**4
+    found = regions(mean, variance, edge)
+    doubt = region_sums(variance**2, edge) / (rounds - 1) / found.pixels**4
     excess = (stack - mean).max(axis=(0, 1, 2)) * rounds / (rounds - 1)  # the sample moves the mean too
-    return _Means(
-        region_sums(mean, edge) / pixels,
-        region_sums(variance, edge) / pixels**2,
-        doubt,
-        rounds,
-        pixels,
-        np.maximum(excess, largest),
-    )
+    return _Means(found.mean, found.variance, doubt, rounds, found.pixels, np.maximum(excess, largest))
 
 
 def _welch(a: _Means, b: _Means, spp: tuple[int, int] | None) -> _Tests:

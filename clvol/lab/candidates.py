@@ -13,7 +13,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from clvol.device.device import Device
-from clvol.lab.agreement import ROUNDING, region_sums
+from clvol.lab.agreement import ROUNDING
+from clvol.lab.statistics import Interval, bootstrap, regions, round_variance
 from clvol.lab.trials import Trial
 from clvol.rendering.outcome import LARGE_WEIGHT, make_result
 
@@ -58,15 +59,7 @@ class Candidate:
     @property
     def variance(self) -> np.ndarray:
         """Of a round, the mean over channels, between rounds; float64 (pixels,)."""
-        return np.var(self.images, axis=0, ddof=1, dtype=np.float64).mean(axis=-1).ravel()
-
-    def regions(self, edge: int) -> tuple[np.ndarray, np.ndarray]:
-        """Means over squares of edge² pixels and over all rounds, and the variance of these; float64
-        (regions y, regions x, channels) each."""
-        images = np.asarray(self.images, np.float64)
-        pixels = region_sums(np.ones((*images.shape[1:3], 1)), edge)
-        variance = region_sums(images.var(axis=0, ddof=1), edge) / pixels**2 / len(images)
-        return region_sums(images.mean(axis=0), edge) / pixels, variance
+        return round_variance(self.images).ravel()
 
     def since(self, first: int) -> Candidate:
         """With the rounds from the given one on alone."""
@@ -85,13 +78,8 @@ class Candidate:
         self.seconds.append(spent / (session.device.info.compute_units if session.device.is_cpu else 1))
 
 
-@dataclass(frozen=True)
-class Relative:
+class Relative(Interval):
     """An efficiency over another's, with its 95 % interval."""
-
-    value: float
-    low: float
-    high: float
 
     def __str__(self) -> str:
         return f"{self.value:.2f} ({self.low:.2f} to {self.high:.2f})"
@@ -116,15 +104,16 @@ def shortfall(one: Candidate, other: Candidate) -> float:
     """
     found = 0.0
     certain = blind(one, other)
-    pixels_of = np.ones((*one.images[0].shape[:2], 1))
-    for edge, deviations in ((_TILE, TILE_DEVIATIONS), (max(pixels_of.shape), DEVIATIONS)):
-        (mean, variance), (its_mean, its_variance) = one.regions(edge), other.regions(edge)
-        known = 0.0 if certain else deviations * np.sqrt(variance + its_variance)
-        rounding = ROUNDING * np.maximum(np.abs(mean), np.abs(its_mean))
-        lacking = np.maximum(its_mean - mean - known - rounding, 0.0)
-        pixels = region_sums(pixels_of, edge)
-        missed = pixels * len(one.images) * lacking**2
-        found = max(found, float((missed * pixels).sum() / (pixels.sum() * missed.shape[-1])))
+    stacks = [np.asarray(candidate.images, np.float64) for candidate in (one, other)]
+    moments = [(stack.mean(axis=0), stack.var(axis=0, ddof=1)) for stack in stacks]
+    for edge, deviations in ((_TILE, TILE_DEVIATIONS), (max(stacks[0].shape[1:3]), DEVIATIONS)):
+        mine, its = (regions(*pair, edge) for pair in moments)
+        variance = mine.variance / len(stacks[0]) + its.variance / len(stacks[1])
+        known = 0.0 if certain else deviations * np.sqrt(variance)
+        rounding = ROUNDING * np.maximum(np.abs(mine.mean), np.abs(its.mean))
+        lacking = np.maximum(its.mean - mine.mean - known - rounding, 0.0)
+        missed = mine.pixels * len(stacks[0]) * lacking**2
+        found = max(found, float((missed * mine.pixels).sum() / (mine.pixels.sum() * missed.shape[-1])))
     return found
 
 
@@ -145,18 +134,19 @@ def relative_efficiency(one: Candidate, other: Candidate, resamples: int = 400) 
     """Efficiency of one over the other's: its interval is a bootstrap over pixels and over rounds."""
     if one is other:
         return Relative(1.0, 1.0, 1.0)
-    random = np.random.default_rng(1)
-    sides = []
-    for candidate, beside in ((other, one), (one, other)):
-        sides.append((error(candidate, [beside]), np.array(candidate.seconds), candidate.extra))
+    sides = [
+        (error(candidate, [beside]), np.array(candidate.seconds), candidate.extra)
+        for candidate, beside in ((other, one), (one, other))
+    ]
     pixels = len(sides[0][0])
-    drawn = np.empty(resamples)
-    for n in range(resamples):
+
+    def drawn(random: np.random.Generator) -> float:
         at = random.integers(pixels, size=pixels)
         parts = [inverse_efficiency(v[at], random.choice(s, len(s)), extra) for v, s, extra in sides]
-        drawn[n] = _quotient(*parts)
+        return _quotient(*parts)
+
     value = _quotient(*(inverse_efficiency(*side) for side in sides))
-    return Relative(value, *(float(q) for q in np.quantile(drawn, (0.025, 0.975))))
+    return Relative(value, *bootstrap(drawn, resamples))
 
 
 def _quotient(a: float, b: float) -> float:

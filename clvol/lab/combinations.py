@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -135,13 +135,3 @@ def covering(features: Features, first: Mapping[str, str], most: int | None = No
             return Covering(tuple(chosen), sum(int(t.sum()) for t in pairs.values()), possible)
         mark(codes[best])
         chosen.append(asked[best])
-
-
-def independent_seeds(seed: int, purpose: str) -> Iterator[int]:
-    """64-bit seeds, none of them `seed` itself: of each `seed` and `purpose` others."""
-    words = np.random.SeedSequence([seed, *purpose.encode()])
-    while True:
-        (words,), drawn = words.spawn(1), words
-        found = int(drawn.generate_state(1, np.uint64)[0])
-        if found != seed:
-            yield found

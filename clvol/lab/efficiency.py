@@ -14,19 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtr, stdtrit
 
+from clvol.lab.statistics import Interval
+
 LEAST_ROUNDS = 4
 """Fewer say nothing about tails."""
 _ROWS = 64
 """Rows of the picture that are looked at at once, for memory's sake."""
-
-
-@dataclass(frozen=True)
-class Interval:
-    """An estimate and the ends of its interval, 95 % unless its maker says otherwise."""
-
-    value: float
-    low: float
-    high: float
 
 
 @dataclass(frozen=True)
@@ -258,17 +251,6 @@ def degrees_of_freedom(values: np.ndarray) -> float:
         (count - 1) / ((count - 2) * (count - 3)) * ((count + 1) * peaked + 6)
     )  # unbiased for normal ones
     return 2.0 / (2.0 / (count - 1) + max(float(excess), 0.0) / count)
-
-
-def holm(p_values: np.ndarray) -> np.ndarray:
-    """p-values adjusted for their number by Holm's step-down method; nan stays nan and does not count."""
-    p_values = np.asarray(p_values, np.float64)
-    adjusted = np.full_like(p_values, np.nan)
-    known = np.flatnonzero(np.isfinite(p_values))
-    order = known[np.argsort(p_values[known])]
-    steps = p_values[order] * np.arange(len(order), 0, -1)
-    adjusted[order] = np.minimum(np.maximum.accumulate(steps), 1.0) if len(order) else []
-    return adjusted
 
 
 def largest_share(products: np.ndarray) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 
 from clvol.lab.agreement import Agreement, agreement
 from clvol.lab.combinations import Names
+from clvol.lab.statistics import round_variance
 from clvol.rendering.outcome import LARGE_WEIGHT
 
 NOISY = 4.0
@@ -76,7 +77,7 @@ class Tested:
     @property
     def noise(self) -> float:
         """Variance of a round, the mean over pixels and channels."""
-        return float(self.images.var(axis=0, ddof=1, dtype=np.float64).mean())
+        return float(round_variance(self.images).mean())
 
 
 @dataclass(frozen=True, eq=False)

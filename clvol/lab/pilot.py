@@ -25,9 +25,10 @@ from clvol.lab.candidates import (
     precomputation,
     relative_efficiency,
 )
-from clvol.lab.combinations import independent_seeds, unbiased
+from clvol.lab.combinations import unbiased
 from clvol.lab.quiet import quiet_renders
 from clvol.lab.reduced import reduced
+from clvol.lab.seeds import independent_seeds
 from clvol.lab.trials import Trial
 from clvol.planning.choices import Choices, majorant_needs, prepare_for, refuse_impossible, resolve
 from clvol.planning.config import KernelConfig

@@ -23,13 +23,13 @@ from clvol.lab.combinations import (
     LIGHTS,
     biased,
     covering,
-    independent_seeds,
     names_in_force,
     options_of,
 )
 from clvol.lab.judgement import Judgement, Tested, judge
 from clvol.lab.quiet import quiet_renders
 from clvol.lab.reduced import reduced
+from clvol.lab.seeds import independent_seeds
 from clvol.lab.trials import Trial, rounds
 from clvol.picture.result import Result
 from clvol.planning.choices import Choices

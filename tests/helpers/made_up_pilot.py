@@ -7,7 +7,7 @@ from pictures import box, gridded, picture, volume
 
 from clvol.lab import pilot as pilots
 from clvol.lab.candidates import Candidate
-from clvol.lab.combinations import independent_seeds
+from clvol.lab.seeds import independent_seeds
 from clvol.planning.choices import resolve
 from clvol.planning.config import KernelConfig
 from clvol.scene.records import ConstantEmitter, DirectionalEmitter

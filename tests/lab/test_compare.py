@@ -20,15 +20,16 @@ from clvol.errors import OptionError
 from clvol.lab.comparison.bar import progress_words
 from clvol.lab.comparison.combine import Lineup, open_lineup
 from clvol.lab.comparison.figures import compute_figures
-from clvol.lab.comparison.measure import REFERENCE_SAMPLES, Measured, Plan, measure, seeds_from
+from clvol.lab.comparison.measure import REFERENCE_SAMPLES, Measured, Plan, measure
 from clvol.lab.comparison.plots import plain_number
 from clvol.lab.comparison.reference import Reference, read_reference
 from clvol.lab.comparison.report import as_json, check_folder, write_report
 from clvol.lab.comparison.result import Comparison
 from clvol.lab.comparison.shorter import render_slope, shorter_spp
 from clvol.lab.comparison.words import _slope, text_table
-from clvol.lab.efficiency import Interval
 from clvol.lab.names import names_asked, plural
+from clvol.lab.seeds import seeds_from
+from clvol.lab.statistics import Interval
 from clvol.layout import RANDOMIZATIONS
 from clvol.picture.image_io import encode_exr, split_channels
 from clvol.planning.registry import FAMILIES

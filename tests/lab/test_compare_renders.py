@@ -20,7 +20,8 @@ from clvol.lab.comparison.measure import Measured
 from clvol.lab.comparison.reference import Reference
 from clvol.lab.comparison.result import Comparison
 from clvol.lab.comparison.shorter import render_slope
-from clvol.lab.efficiency import Interval, error_products, fitted_slope
+from clvol.lab.efficiency import error_products, fitted_slope
+from clvol.lab.statistics import Interval
 from clvol.lab.trials import Trial
 from clvol.planning.choices import Choices
 from clvol.planning.registry import TECHNIQUES

@@ -19,10 +19,10 @@ from clvol.lab.efficiency import (
     degrees_of_freedom,
     error_products,
     fitted_slope,
-    holm,
     noise_and_bias,
     slopes,
 )
+from clvol.lab.statistics import holm
 
 FALSE_ALARM = 1e-4
 

@@ -20,8 +20,9 @@ from clvol.errors import OptionError
 from clvol.lab import candidates
 from clvol.lab import pilot as pilots
 from clvol.lab.candidates import Candidate, Relative
-from clvol.lab.combinations import independent_seeds, unbiased
+from clvol.lab.combinations import unbiased
 from clvol.lab.repeat import announcement, repeat_command, with_definitions
+from clvol.lab.seeds import independent_seeds
 from clvol.planning.choices import Choices
 
 # -- made-up candidates ---------------------------------------------------------------------------

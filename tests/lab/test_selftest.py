@@ -18,9 +18,10 @@ from clvol.device import programs
 from clvol.errors import OptionError
 from clvol.lab import judgement
 from clvol.lab import selftest as selftests
-from clvol.lab.combinations import KEYS, covering, in_force, independent_seeds, unbiased, usable
+from clvol.lab.combinations import KEYS, covering, in_force, unbiased, usable
 from clvol.lab.judgement import judge
 from clvol.lab.reduced import reduced
+from clvol.lab.seeds import independent_seeds
 from clvol.lab.selftest import SelfTest
 from clvol.lab.trials import rounds
 from clvol.planning.features import Features

@@ -12,16 +12,15 @@ from clvol.lab.comparison.measure import Measured
 from clvol.lab.comparison.reference import Reference
 from clvol.lab.comparison.shorter import render_slope
 from clvol.lab.efficiency import (
-    Interval,
     Work,
     compare_efficiency,
     convergence,
     convergence_bands,
     error_products,
     fitted_slope,
-    holm,
     largest_share,
 )
+from clvol.lab.statistics import Interval, holm
 
 LEVEL = 0.05
 """Probability that any of the efficiencies of one kind is called significantly different though it is not."""

@@ -3,7 +3,6 @@ reference, each render with a seed of its own."""
 
 from __future__ import annotations
 
-import itertools
 import logging
 import math
 from collections.abc import Callable, Iterator
@@ -19,6 +18,7 @@ from clvol.lab.comparison.reference import Reference
 from clvol.lab.comparison.shorter import shorter_spp
 from clvol.lab.efficiency import LEAST_ROUNDS
 from clvol.lab.quiet import log_filter
+from clvol.lab.seeds import seeds_from
 from clvol.lab.trials import Trial, rounds
 from clvol.picture.result import Result
 
@@ -141,17 +141,6 @@ def _noted(notes: dict[str, str]) -> Iterator[None]:
 
     with log_filter(first_time):
         yield
-
-
-def seeds_from(seed: int, taken: tuple[int, int] | None = None) -> Iterator[int]:
-    """64-bit seeds counting up from `seed`, without those taken, from the first to the last."""
-    if taken is not None and seed <= taken[1]:
-        seed = max(seed, taken[1] + 1) if seed >= taken[0] else seed
-        before = itertools.takewhile(lambda n: n < taken[0], itertools.count(seed))
-        counted = itertools.chain(before, itertools.count(max(seed, taken[1] + 1)))
-    else:
-        counted = itertools.count(seed)
-    return (n % 2**64 for n in counted)
 
 
 def measure(

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.special import stdtrit
 
-from clvol.lab.efficiency import Interval
+from clvol.lab.statistics import Interval
 
 _FACTOR, _STEPS, _LEAST = 4, 2, 4
 

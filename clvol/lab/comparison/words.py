@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from clvol.lab.comparison.figures import ALPHA, COSTS, LEVEL, Efficiency, Figures
 from clvol.lab.comparison.findings import Findings
 from clvol.lab.comparison.measure import uses_sobol
-from clvol.lab.efficiency import Interval
+from clvol.lab.statistics import Interval
 
 _HEAVY = 0.5
 """A round with more of the squared error than this, and than four times its share, is not like the others."""
