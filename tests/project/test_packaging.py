@@ -127,7 +127,7 @@ def test_editable_install_reads_the_kernels_of_its_checkout(source: Path, tmp_pa
 def test_source_distribution_holds_what_its_tests_need(tmp_path: Path) -> None:
     checkout = tmp_path / "checkout"
     left_out = shutil.ignore_patterns(
-        ".git", ".venv", ".lowest", "build", "*.egg-info", "__pycache__", ".*_cache"
+        ".git", ".venv", ".lowest", ".docs", "site", "build", "*.egg-info", "__pycache__", ".*_cache"
     )
     shutil.copytree(ROOT, checkout, ignore=left_out)
     command = [sys.executable, "-m", "build", "--sdist", "--outdir", str(tmp_path), str(checkout)]
