@@ -9,7 +9,7 @@
 #
 # Run it cell by cell in any editor or notebook that knows `# %%`, or whole, from the folder of the
 # checkout: `python docs/tutorial.py`. It takes about three minutes on two cores, and leaves its files in
-# `tutorial/`.
+# `tutorial/`. Its report needs matplotlib: `pip install '.[report]'`.
 
 # %%
 import os
