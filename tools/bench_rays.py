@@ -96,14 +96,12 @@ class OurSide:
 
     def __init__(self, device: Device, bvh: Bvh) -> None:
         flags = {"CLVOL_SPECTRUM": 1, "CLVOL_EXTINCTION": 1, "CLVOL_ONE_CHANNEL_PER_PATH": 0}
-        flags |= {"CLVOL_HAS_TRIANGLES": 1, "CLVOL_HAS_QUADRICS": 0, "CLVOL_BVH_STACK": bvh.stack}
-        seen: set[str] = set()
-        text = [f"#define {name} {value}" for name, value in flags.items()]
-        text += programs._expand("core/types.h", seen)
-        text.append("typedef struct { __global const float8 *bvh_nodes, *bvh_triangles; } Scene;")
-        text += programs._expand("geometry/bvh.h", seen)
+        flags |= {"CLVOL_HAS_SURFACES": 1, "CLVOL_HAS_TRIANGLES": 1, "CLVOL_HAS_QUADRICS": 0}
+        flags["CLVOL_BVH_STACK"] = bvh.stack
+        scene = "typedef struct { __global const float8 *bvh_nodes, *bvh_triangles; } Scene;"
+        text = programs.expand('#include "geometry/bvh.h"\n' + KERNEL, flags, {}, scene)
         self.device = device
-        self.kernel = cl.Kernel(programs.build(device, "\n".join(text) + KERNEL, "rays"), "trace")
+        self.kernel = cl.Kernel(programs.build(device, text, "rays"), "trace")
         self.tree = [self.buffer(bvh.nodes), self.buffer(bvh.packets)]
 
     def buffer(self, array: np.ndarray) -> cl.Buffer:

@@ -1,11 +1,17 @@
 /* The BSDF of a material: dispatches to the kinds that the scene has.
 
-   The headers of those kinds are included before this one (BSDF_HEADERS in clvol/tables/materials.py), with
-   CLVOL_BSDF_<kind> 1; of the others there is nothing.  A mask is the `opacity` of a material, which the caller decides
+   CLVOL_BSDF_<kind> is 1 for those; of the others nothing is compiled.  A mask is the `opacity` of a material, which the caller decides
    first; all here is what is left of the surface then.  One-sided kinds reflect on the side of +z alone: the caller
    picks the side's material and turns z (material_transmits). */
-#ifndef CLVOL_BSDF_H
-#define CLVOL_BSDF_H
+#ifndef CLVOL_BSDF_BSDF_H
+#define CLVOL_BSDF_BSDF_H
+#include "bsdf/conductor.h"
+#include "bsdf/dielectric.h"
+#include "bsdf/diffuse.h"
+#include "bsdf/plastic.h"
+#include "bsdf/rough_conductor.h"
+#include "bsdf/rough_dielectric.h"
+#include "bsdf/rough_plastic.h"
 #include "bsdf/sample.h"
 
 /* Without a look where the scene has one kind only. */

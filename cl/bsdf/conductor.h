@@ -1,6 +1,7 @@
 /* Smooth metal: one delta lobe. */
 #ifndef CLVOL_BSDF_CONDUCTOR_H
 #define CLVOL_BSDF_CONDUCTOR_H
+#if CLVOL_BSDF_CONDUCTOR
 #include "bsdf/fresnel.h"
 #include "bsdf/sample.h"
 
@@ -12,4 +13,5 @@ INLINE bool conductor_sample(const Scene *scene, __global const Material *materi
     return delta_sample(sample, mirrored(wi), weight, 1.0f) && wi.z > 0.0f;
 }
 
+#endif
 #endif

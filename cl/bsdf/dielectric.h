@@ -1,6 +1,7 @@
 /* Smooth boundary between two dielectrics, and a thin pane: delta lobes only. */
 #ifndef CLVOL_BSDF_DIELECTRIC_H
 #define CLVOL_BSDF_DIELECTRIC_H
+#if CLVOL_BSDF_DIELECTRIC || CLVOL_BSDF_THIN_DIELECTRIC
 #include "bsdf/fresnel.h"
 #include "bsdf/sample.h"
 
@@ -33,4 +34,5 @@ INLINE bool thin_dielectric_sample(const Scene *scene, __global const Material *
     return true;
 }
 
+#endif
 #endif

@@ -1,6 +1,7 @@
 /* Lambertian reflection. */
 #ifndef CLVOL_BSDF_DIFFUSE_H
 #define CLVOL_BSDF_DIFFUSE_H
+#if CLVOL_BSDF_DIFFUSE
 #include "bsdf/sample.h"
 
 INLINE bool diffuse_sample(const Scene *scene, __global const Material *material, float2 uv, float3 wi, float u,
@@ -17,4 +18,5 @@ INLINE Spectrum diffuse_value(const Scene *scene, __global const Material *mater
     return reflectance(scene, material, uv, channel) * *pdf;
 }
 
+#endif
 #endif

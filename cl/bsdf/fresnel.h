@@ -1,6 +1,7 @@
 /* Fresnel reflectance of unpolarised light. */
 #ifndef CLVOL_BSDF_FRESNEL_H
 #define CLVOL_BSDF_FRESNEL_H
+#include "core/scene.h"
 
 typedef struct {
     float reflectance;

@@ -5,7 +5,7 @@
    come divided by |cos theta|, which stays finite at the horizon. */
 #ifndef CLVOL_BSDF_MICROFACET_H
 #define CLVOL_BSDF_MICROFACET_H
-#include "core/types.h"
+#include "core/scene.h"
 
 /* Density D of the normals m per solid angle and area; m.z > 0. */
 INLINE float microfacet_density(__global const Material *material, float3 m)

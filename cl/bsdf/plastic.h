@@ -1,6 +1,7 @@
 /* A diffuse base under a smooth dielectric coat. */
 #ifndef CLVOL_BSDF_PLASTIC_H
 #define CLVOL_BSDF_PLASTIC_H
+#if CLVOL_BSDF_PLASTIC || CLVOL_BSDF_ROUGH_PLASTIC
 #include "bsdf/fresnel.h"
 #include "bsdf/sample.h"
 
@@ -50,4 +51,5 @@ INLINE bool plastic_sample(const Scene *scene, __global const Material *material
     return pdf > 0.0f && scattered_sample(sample, wo, value / pdf, pdf, 1.0f);
 }
 
+#endif
 #endif

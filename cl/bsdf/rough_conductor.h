@@ -1,6 +1,7 @@
 /* Metal of microfacets. */
 #ifndef CLVOL_BSDF_ROUGH_CONDUCTOR_H
 #define CLVOL_BSDF_ROUGH_CONDUCTOR_H
+#if CLVOL_BSDF_ROUGH_CONDUCTOR
 #include "bsdf/fresnel.h"
 #include "bsdf/microfacet.h"
 #include "bsdf/sample.h"
@@ -36,4 +37,5 @@ INLINE Spectrum rough_conductor_value(const Scene *scene, __global const Materia
            conductor_reflectance(material, dot(wi, m), channel);
 }
 
+#endif
 #endif

@@ -1,6 +1,7 @@
 /* Boundary of microfacets between two dielectrics (Walter et al. 2007). */
 #ifndef CLVOL_BSDF_ROUGH_DIELECTRIC_H
 #define CLVOL_BSDF_ROUGH_DIELECTRIC_H
+#if CLVOL_BSDF_ROUGH_DIELECTRIC
 #include "bsdf/fresnel.h"
 #include "bsdf/microfacet.h"
 #include "bsdf/sample.h"
@@ -65,4 +66,5 @@ INLINE Spectrum rough_dielectric_value(const Scene *scene, __global const Materi
                                : specular_transmittance(scene, material, uv, channel));
 }
 
+#endif
 #endif

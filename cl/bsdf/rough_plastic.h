@@ -4,6 +4,7 @@
    (clvol/tables/materials.py). */
 #ifndef CLVOL_BSDF_ROUGH_PLASTIC_H
 #define CLVOL_BSDF_ROUGH_PLASTIC_H
+#if CLVOL_BSDF_ROUGH_PLASTIC
 #include "bsdf/fresnel.h"
 #include "bsdf/microfacet.h"
 #include "bsdf/plastic.h"
@@ -51,4 +52,5 @@ INLINE bool rough_plastic_sample(const Scene *scene, __global const Material *ma
     return pdf > 0.0f && scattered_sample(sample, wo, value / pdf, pdf, 1.0f);
 }
 
+#endif
 #endif

@@ -4,7 +4,7 @@
    came from, wo to where it goes.  Values are f |cos theta_o| for radiance that travels from wo to wi. */
 #ifndef CLVOL_BSDF_SAMPLE_H
 #define CLVOL_BSDF_SAMPLE_H
-#include "core/types.h"
+#include "core/scene.h"
 #include "texture/texture.h"
 
 #define INV_PI 0.31830988618379067154f

@@ -1,6 +1,8 @@
 /* Sampler "independent": no number that a path decides by has to do with another. */
 #ifndef CLVOL_CORE_INDEPENDENT_H
 #define CLVOL_CORE_INDEPENDENT_H
+#include "core/random.h"
+#include "core/scene.h"
 
 /* Four numbered dimensions, full 32-bit.  `interval` tells apart the walks of one bounce. */
 INLINE uint4 decision_block(const Scene *scene, SampleKey key, uint block, uint interval)

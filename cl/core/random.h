@@ -5,6 +5,7 @@
    Tracking loops read a *stream* that a block seeds: any number of draws, same counter principle. */
 #ifndef CLVOL_CORE_RANDOM_H
 #define CLVOL_CORE_RANDOM_H
+#include "core/math.h"
 
 /* Blocks of four dimensions within one bounce. */
 #define BLOCK_CAMERA 0u    /* pixel x, pixel y, place on the lens (2) */

@@ -1,6 +1,7 @@
 /* Directions from uniform numbers. */
 #ifndef CLVOL_CORE_SAMPLING_H
 #define CLVOL_CORE_SAMPLING_H
+#include "core/math.h"
 
 /* Orthonormal frame around the unit vector n (Duff et al. 2017). */
 INLINE float3 to_frame(float3 n, float x, float y, float z)

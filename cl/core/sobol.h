@@ -6,6 +6,8 @@
    Samples of one randomisation depend on each other; randomisations do not (clvol/picture/estimate.py). */
 #ifndef CLVOL_CORE_SOBOL_H
 #define CLVOL_CORE_SOBOL_H
+#include "core/random.h"
+#include "core/scene.h"
 
 #define SOBOL_SHUFFLED 0x3FFu /* samples are put in another order within runs of so many and one */
 

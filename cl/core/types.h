@@ -6,6 +6,7 @@
    hold one float per channel. */
 #ifndef CLVOL_CORE_TYPES_H
 #define CLVOL_CORE_TYPES_H
+#include "core/math.h"
 
 #include "core/math.h"
 

@@ -3,6 +3,7 @@
    for a trilinear filter, so that two Gauss-Legendre points integrate it exactly (METHODS §3, regular). */
 #ifndef CLVOL_DENSITY_SEGMENTS_H
 #define CLVOL_DENSITY_SEGMENTS_H
+#include "density/volume.h"
 #include "geometry/lattice.h"
 #include "tracking/walk.h"
 

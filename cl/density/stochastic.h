@@ -4,8 +4,9 @@
    trilinear weight: the expectation is the trilinear value, at an eighth of the loads.  Right wherever
    the density of one look-up is used once and linearly (METHODS §6); the bounds hold, as they hold for
    every sample of a cell.  A volume whose filter is `nearest` is not jittered. */
-#ifndef CLVOL_DENSITY_LOOKUP_H
-#define CLVOL_DENSITY_LOOKUP_H
+#ifndef CLVOL_DENSITY_STOCHASTIC_H
+#define CLVOL_DENSITY_STOCHASTIC_H
+#include "core/random.h"
 #include "density/volume.h"
 
 INLINE int drawn_corner(const VolumeCell *cell, bool nearest, Stream *stream)

@@ -5,6 +5,10 @@
    is large and mostly empty.  Points beyond the lattice take the value at its border. */
 #ifndef CLVOL_DENSITY_VOLUME_H
 #define CLVOL_DENSITY_VOLUME_H
+#include "core/scene.h"
+#if CLVOL_HAS_TOP_TREES
+#include "geometry/lattice_tree.h"
+#endif
 
 #define BRICK_SAMPLES 729
 

@@ -6,7 +6,9 @@
    geometric normal as `hit_surface` finds there. */
 #ifndef CLVOL_EMITTER_AREA_H
 #define CLVOL_EMITTER_AREA_H
+#if CLVOL_HAS_AREA
 #include "core/sampling.h"
+#include "core/scene.h"
 #include "emitter/cdf.h"
 #include "emitter/light_sample.h"
 #include "geometry/surface.h"
@@ -157,4 +159,5 @@ INLINE float area_pdf(const Scene *scene, const Surface *surface, float3 from, f
     return emitter->select_pdf * distance * distance / (emitter->area * -dot(surface->ng, d));
 }
 
+#endif
 #endif

@@ -1,6 +1,7 @@
 /* Inversion of tabulated distributions. */
 #ifndef CLVOL_EMITTER_CDF_H
 #define CLVOL_EMITTER_CDF_H
+#include "core/math.h"
 
 /* First index i in [0, n) with cdf[i + 1] > u; cdf has n + 1 entries from 0 to 1.  An entry of probability 0 is
    never found. */

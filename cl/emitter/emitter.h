@@ -1,7 +1,10 @@
 /* Light: the environment behind everything, and what next-event estimation samples. */
-#ifndef CLVOL_EMITTER_H
-#define CLVOL_EMITTER_H
+#ifndef CLVOL_EMITTER_EMITTER_H
+#define CLVOL_EMITTER_EMITTER_H
 #include "core/sampling.h"
+#include "core/scene.h"
+#include "emitter/area.h"
+#include "emitter/envmap.h"
 #include "emitter/light_sample.h"
 #include "emitter/spot.h"
 

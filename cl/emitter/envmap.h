@@ -5,6 +5,8 @@
    distributions, inverted by bisection, so that stratified numbers stay stratified. */
 #ifndef CLVOL_EMITTER_ENVMAP_H
 #define CLVOL_EMITTER_ENVMAP_H
+#if CLVOL_HAS_ENVMAP
+#include "core/scene.h"
 #include "emitter/cdf.h"
 
 /* Fractional column (in cells between texel centres, 0..W) and row (0..H-1) of a world direction. */
@@ -65,4 +67,5 @@ INLINE float3 envmap_sample(const Scene *scene, float u, float v, float *pdf)
     return normalize(transform_vector(scene->envmap->world_from_env, d));
 }
 
+#endif
 #endif

@@ -1,6 +1,7 @@
 /* What next-event estimation draws: one direction towards one light. */
 #ifndef CLVOL_EMITTER_LIGHT_SAMPLE_H
 #define CLVOL_EMITTER_LIGHT_SAMPLE_H
+#include "core/scene.h"
 
 typedef struct {
     float3 direction; /* towards the light */

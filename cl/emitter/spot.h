@@ -2,6 +2,7 @@
    beam's width to nothing at the cutoff (Mitsuba's). */
 #ifndef CLVOL_EMITTER_SPOT_H
 #define CLVOL_EMITTER_SPOT_H
+#include "core/scene.h"
 #include "emitter/light_sample.h"
 
 /* Share of the intensity that travels along d, a unit vector. */

@@ -9,6 +9,10 @@
    scene->bvh_nodes and scene->bvh_triangles are rows of eight floats, as clvol/accel/bvh.py says. */
 #ifndef CLVOL_GEOMETRY_BVH_H
 #define CLVOL_GEOMETRY_BVH_H
+#if CLVOL_HAS_SURFACES
+#include "core/scene.h"
+#include "geometry/quadric.h"
+#include "geometry/triangle.h"
 
 #define NO_PRIMITIVE 0xFFFFFFFFu
 
@@ -30,13 +34,6 @@ INLINE bool is_target(const Hit *hit, const Target *target)
     return hit->primitive == target->primitive ||
            (hit->primitive - target->first < target->count && hit->t >= target->near_);
 }
-
-#if CLVOL_HAS_TRIANGLES
-#include "geometry/triangle.h"
-#endif
-#if CLVOL_HAS_QUADRICS
-#include "geometry/quadric.h"
-#endif
 
 #define NODE_ROWS 8u
 #define PACKET_ROWS 10u
@@ -296,4 +293,5 @@ INLINE bool any_hit(const Scene *scene, Ray ray, float t_max, const Target *targ
     return query.found;
 }
 
+#endif
 #endif

@@ -1,6 +1,8 @@
 /* Media as intervals along a ray: analytic cube and sphere, and the box of a volume. */
 #ifndef CLVOL_GEOMETRY_INTERVAL_H
 #define CLVOL_GEOMETRY_INTERVAL_H
+#if CLVOL_HAS_MEDIA
+#include "core/scene.h"
 
 /* Cuts [t0, t1] to one slab.  A ray along it, which over the box's length moves by no more than rounding, is all in or all
    out: of the slab's two faces the lower counts, the upper does not, to rounding, so that of boxes side by side one
@@ -109,4 +111,5 @@ INLINE bool medium_span(__global const Medium *medium, Ray ray, float from, floa
     return span->start < span->end;
 }
 
+#endif
 #endif

@@ -3,6 +3,7 @@
    The outermost cells reach out to infinity. */
 #ifndef CLVOL_GEOMETRY_LATTICE_H
 #define CLVOL_GEOMETRY_LATTICE_H
+#include "core/types.h"
 
 typedef struct {
     float t;           /* where the next plane is crossed */

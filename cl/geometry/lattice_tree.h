@@ -3,6 +3,7 @@
    the value of all the places that it stands for. */
 #ifndef CLVOL_GEOMETRY_LATTICE_TREE_H
 #define CLVOL_GEOMETRY_LATTICE_TREE_H
+#include "core/math.h"
 
 /* The value at a place below 8^levels; *shift: the entry that holds it is a cube of 2^shift places an axis. */
 INLINE int tree_find(__global const int *nodes, int levels, int x, int y, int z, int *shift)

@@ -1,7 +1,9 @@
 /* The point of a surface that a ray has hit, as BSDFs and lights take it. */
 #ifndef CLVOL_GEOMETRY_SURFACE_H
 #define CLVOL_GEOMETRY_SURFACE_H
+#if CLVOL_HAS_SURFACES
 #include "core/sampling.h"
+#include "core/scene.h"
 #include "geometry/bvh.h"
 
 typedef struct {
@@ -168,4 +170,5 @@ INLINE float3 spawn_point(const Surface *surface, float3 d)
     return surface->p + distance * n;
 }
 
+#endif
 #endif

@@ -3,6 +3,8 @@
 
    Sums are pairs of floats (value and rounding error), 48 bits in all: float32 alone drifts after some
    ten million samples (METHODS §7). */
+#include "core/scene.h"
+
 #pragma OPENCL FP_CONTRACT OFF
 
 /* sum += value, error-free (Knuth's two-sum); x: sum, y: what rounding lost. */

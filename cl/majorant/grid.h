@@ -1,6 +1,6 @@
 /* A uniform grid of bounds, walked cell by cell. */
-#ifndef CLVOL_MAJORANT_H
-#define CLVOL_MAJORANT_H
+#ifndef CLVOL_MAJORANT_GRID_H
+#define CLVOL_MAJORANT_GRID_H
 #include "geometry/lattice.h"
 #include "tracking/interface.h"
 

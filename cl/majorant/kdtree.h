@@ -5,8 +5,8 @@
    bits of a non-negative float rounds it up, so it stays a bound; 3 alone stands for an exact 0),
    y is the leaf's row in the tables of controls.  Planes are numbers of the finest majorant cells, so
    that the walk steps through integers. */
-#ifndef CLVOL_MAJORANT_H
-#define CLVOL_MAJORANT_H
+#ifndef CLVOL_MAJORANT_KDTREE_H
+#define CLVOL_MAJORANT_KDTREE_H
 #include "majorant/box_walk.h"
 
 INLINE bool majorant_next(const MediumRay *in, MajorantWalk *walk)

@@ -1,7 +1,7 @@
 /* A grid of bounds over a lattice that is mostly constant: cells of one size where something changes, and
    larger ones, each of one entry of the tree that all are found through, and crossed in one step, elsewhere. */
-#ifndef CLVOL_MAJORANT_H
-#define CLVOL_MAJORANT_H
+#ifndef CLVOL_MAJORANT_TREE_GRID_H
+#define CLVOL_MAJORANT_TREE_GRID_H
 #include "geometry/lattice_tree.h"
 #include "majorant/box_walk.h"
 

@@ -1,6 +1,10 @@
 /* Single-scattering albedo of a medium. */
 #ifndef CLVOL_MEDIUM_ALBEDO_H
 #define CLVOL_MEDIUM_ALBEDO_H
+#include "core/scene.h"
+#if CLVOL_HAS_ALBEDO_VOLUME
+#include "density/volume.h"
+#endif
 
 /* At world point p. */
 INLINE Spectrum medium_albedo(const Scene *scene, __global const Medium *medium, float3 p, int channel)

@@ -1,6 +1,10 @@
 /* Light that a medium emits: its source term is sigma_a L_e. */
 #ifndef CLVOL_MEDIUM_EMISSION_H
 #define CLVOL_MEDIUM_EMISSION_H
+#include "core/scene.h"
+#if CLVOL_HAS_EMISSION_VOLUME || CLVOL_HAS_TEMPERATURE
+#include "density/volume.h"
+#endif
 #include "medium/albedo.h"
 
 #if CLVOL_HAS_TEMPERATURE

@@ -4,9 +4,11 @@
 
    A medium's phase function is a weighted sum of lobes (one, unless some medium blends).  A direction is drawn
    from one lobe, chosen by its weight, and has the pdf of the sum. */
-#ifndef CLVOL_PHASE_H
-#define CLVOL_PHASE_H
+#ifndef CLVOL_PHASE_PHASE_H
+#define CLVOL_PHASE_PHASE_H
+#if CLVOL_HAS_SCATTERING
 #include "core/sampling.h"
+#include "core/scene.h"
 
 /* Whether a lobe is of a kind, without a look where no medium has it or none has another. */
 #define IS_HG(lobe) (CLVOL_HAS_HG && (!(CLVOL_HAS_ISOTROPIC || CLVOL_HAS_RAYLEIGH) || (lobe)->kind == PHASE_HG))
@@ -116,4 +118,5 @@ INLINE float3 phase_sample(const Scene *scene, __global const Medium *medium, fl
 #endif
 }
 
+#endif
 #endif

@@ -1,5 +1,9 @@
 /* What a ray passes: the surfaces in order (t, number, whether it enters), and the interval of each medium.
    One work-item; reads origin (3) and direction (3). */
+#include "geometry/bvh.h"
+#include "geometry/interval.h"
+#include "geometry/surface.h"
+
 __kernel void places(CLVOL_ARGUMENTS, __global const float *given, __global float *hits, __global float *intervals,
                      uint media, uint capacity)
 {

@@ -1,7 +1,8 @@
-/* Watches a walk: fills the hooks of tracking/record.h with a log of what happens, in order.  Composed before the
+/* Watches a walk: fills the hooks of tracking/record.h with a log of what happens, in order.  Included before the
    trackers, which then run as they do in a render. */
 #ifndef CLVOL_RAY_RECORDER_H
 #define CLVOL_RAY_RECORDER_H
+#include "core/math.h"
 #include "tracking/tally.h"
 
 /* An event: its kind, its distance along the ray, three numbers. */

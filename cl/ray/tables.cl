@@ -1,6 +1,13 @@
 /* What trackers see along one ray: sigma_t at even steps, (channels, points), and, of a majorant that they walk,
    each cell's stretch, bound and controls (t, t_end, majorant, control (3), residual control (3), its rate). */
+#if CLVOL_HAS_HETEROGENEOUS
+#include "density/volume.h"
+#endif
 #include "ray/given.h"
+#if CLVOL_RAY_MAJORANT
+#include "majorant/majorant.h"
+#include "tracking/walk.h"
+#endif
 
 #define CELL_SIZE 10u
 
@@ -22,7 +29,7 @@ __kernel void tables(CLVOL_ARGUMENTS, __global const float *given, __global floa
 #endif
                 sigma[c * points + i] = scale;
         }
-#ifdef WALKS_MAJORANT
+#if CLVOL_RAY_MAJORANT
     if (i > 0)
         return;
     const MediumRay in = given_ray(&scene, given);
@@ -33,10 +40,10 @@ __kernel void tables(CLVOL_ARGUMENTS, __global const float *given, __global floa
         cell[0] = walk.t;
         cell[1] = walk.t_end;
         cell[2] = walk.majorant;
-#ifdef HAS_CONTROLS
+#if CLVOL_RAY_CONTROLS
         vstore3((float3)(cell_extinction(&in, cell_row(&in, scene.controls, walk.cell, 0))), 0, cell + 3);
 #endif
-#ifdef HAS_RESIDUALS
+#if CLVOL_RAY_RESIDUALS
         __global const float *row = cell_row(&in, scene.residuals, walk.cell, 1);
         vstore3((float3)(cell_extinction(&in, row)), 0, cell + 6);
         cell[9] = in.rate * row[CLVOL_DENSITY_CHANNELS];

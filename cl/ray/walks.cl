@@ -1,13 +1,27 @@
-/* Walks along one ray, watched: COLLISIONS by the technique, else estimates of transmittance.
+/* Walks along one ray, watched: collisions by the technique, or estimates of transmittance.
    Reads the ray; writes each walk's outcome (t or -1, weight or estimate (3), tentative, real, look-ups, flaws,
    events) and the events of the first walks. */
+#include "ray/recorder.h" /* before the trackers, whose hooks it fills */
+
+#include "core/random.h"
 #include "ray/given.h"
+#if CLVOL_RAY_COLLISIONS
+#include "tracking/homogeneous.h"
+#if CLVOL_HAS_HETEROGENEOUS
+#include CLVOL_TECHNIQUE_HEADER
+#endif
+#else
+#include "tracking/homogeneous_transmittance.h"
+#if CLVOL_HAS_HETEROGENEOUS
+#include CLVOL_TRANSMITTANCE_HEADER
+#endif
+#endif
 
 #define OUTCOME_SIZE 9u
 /* Legs of a walk, all in one launch, before it is given up and counted. */
 #define MOST_LEGS 256u
 
-#ifdef COLLISIONS
+#if CLVOL_RAY_COLLISIONS
 INLINE bool walk(const MediumRay *in, uint first, Stream *stream, Tally *tally, Collision *collision)
 {
 #if CLVOL_HAS_HOMOGENEOUS
@@ -46,7 +60,7 @@ __kernel void walks(CLVOL_ARGUMENTS, __global const float *given, __global float
     Tally *tally = &recorder.tally;
     uint first = k.x;
     float t = -1.0f;
-#ifdef COLLISIONS
+#if CLVOL_RAY_COLLISIONS
     Collision collision;
     collision.beta = (Spectrum)(1.0f);
     collision.emission = (Spectrum)(0.0f);
@@ -62,14 +76,14 @@ __kernel void walks(CLVOL_ARGUMENTS, __global const float *given, __global float
             tally->stopped = 0;
             first = stream_pair(&stream).x;
         }
-#ifdef COLLISIONS
+#if CLVOL_RAY_COLLISIONS
         if (walk(&in, first, &stream, tally, &collision))
             t = recorder.begun + collision.t;
 #else
         recorder.share *= (float3)(walk(&in, first, &stream, tally));
 #endif
     }
-#ifdef COLLISIONS
+#if CLVOL_RAY_COLLISIONS
     const float3 value = (float3)(collision.beta);
 #else
     const float3 value = recorder.share;

@@ -1,6 +1,10 @@
 /* What scatterings at surfaces and in media have in common: the depth they may reach, and shadow rays. */
 #ifndef CLVOL_STAGES_BOUNCE_H
 #define CLVOL_STAGES_BOUNCE_H
+#if CLVOL_NEE
+#include "emitter/light_sample.h"
+#endif
+#include "stages/path.h"
 
 /* Whether the scattering numbered `bounce` is one too many; what it would have carried on is counted. */
 INLINE bool depth_is_reached(const Scene *scene, uint slot, uint bounce, Spectrum beta)

@@ -1,6 +1,10 @@
 /* Crossing the boundaries of media. */
 #ifndef CLVOL_STAGES_BOUNDARY_H
 #define CLVOL_STAGES_BOUNDARY_H
+#if CLVOL_HAS_SURFACES
+#include "core/scene.h"
+#include "geometry/bvh.h"
+#include "geometry/surface.h"
 
 /* Surfaces that one ray may pass before it is given up and counted. */
 #define MOST_PASSED 65536u
@@ -46,4 +50,5 @@ INLINE Inside find_inside(const Scene *scene, Ray ray)
 }
 #endif
 
+#endif
 #endif

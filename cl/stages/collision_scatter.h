@@ -2,6 +2,21 @@
    absorbed or scattered; a scattering draws one next-event ray and the next direction. */
 #ifndef CLVOL_STAGES_COLLISION_SCATTER_H
 #define CLVOL_STAGES_COLLISION_SCATTER_H
+#if CLVOL_HAS_MEDIA
+#include "core/sampler.h"
+#include "emitter/emitter.h"
+#if CLVOL_EMISSION_AT_COLLISIONS
+#include "medium/emission.h"
+#endif
+#if CLVOL_HAS_SCATTERING || CLVOL_FIRST_HIT
+#include "medium/albedo.h"
+#endif
+#include "phase/phase.h"
+#if CLVOL_HAS_SCATTERING
+#include "stages/bounce.h"
+#endif
+#include "stages/first_hit.h"
+#include "stages/path.h"
 #include "tracking/probability.h"
 
 /* Weight of a path below which absorption is sampled (absorption "mixed").  On cloud.xml, with
@@ -133,4 +148,5 @@ INLINE bool shade_collision(const Scene *scene, uint group, uint slot)
 #endif
 }
 
+#endif
 #endif

@@ -2,6 +2,9 @@
    finds that light, the power heuristic weights the two (METHODS §6). */
 #ifndef CLVOL_STAGES_ESCAPE_H
 #define CLVOL_STAGES_ESCAPE_H
+#if CLVOL_HAS_CONSTANT || CLVOL_HAS_ENVMAP
+#include "emitter/emitter.h"
+#include "stages/path.h"
 
 INLINE void shade_escape(const Scene *scene, uint slot)
 {
@@ -22,4 +25,5 @@ INLINE void shade_escape(const Scene *scene, uint slot)
     set_radiance(scene, slot, get_radiance(scene, slot) + radiance);
 }
 
+#endif
 #endif

@@ -1,6 +1,12 @@
 /* What pictures show beside radiance: where a camera path first scatters, at a surface or in a medium. */
 #ifndef CLVOL_STAGES_FIRST_HIT_H
 #define CLVOL_STAGES_FIRST_HIT_H
+#if CLVOL_FIRST_HIT
+#if CLVOL_HAS_SURFACES
+#include "bsdf/sample.h"
+#include "geometry/surface.h"
+#endif
+#include "stages/path.h"
 
 /* As three channels; a path that follows one of them stands for the sum of three paths. */
 INLINE float3 to_rgb(Spectrum s, int channel)
@@ -56,4 +62,5 @@ INLINE void first_surface(const Scene *scene, uint slot, const Surface *surface,
 }
 #endif
 
+#endif
 #endif

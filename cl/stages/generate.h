@@ -1,6 +1,8 @@
 /* Writes a finished path's result at its job's own index and starts the next job in its slot. */
 #ifndef CLVOL_STAGES_GENERATE_H
 #define CLVOL_STAGES_GENERATE_H
+#include "core/sampler.h"
+#include "stages/path.h"
 
 /* A job is one sample of one pixel, or, where a path follows one channel, a third of it; consecutive jobs are
    channels of a sample and samples of a pixel, so that rays that run together stay together. */

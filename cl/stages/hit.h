@@ -1,6 +1,9 @@
 /* The surface that a path has met. */
 #ifndef CLVOL_STAGES_HIT_H
 #define CLVOL_STAGES_HIT_H
+#if CLVOL_HAS_SURFACES
+#include "geometry/bvh.h"
+#include "stages/path.h"
 
 INLINE uint path_after_primitive_or_none(const Scene *scene, uint slot)
 {
@@ -34,4 +37,5 @@ INLINE void set_path_hit(const Scene *scene, uint slot, const Hit *hit)
 #endif
 }
 
+#endif
 #endif

@@ -1,6 +1,16 @@
 /* Finds what lies ahead on the path's ray: the first surface, and whether media come before it. */
 #ifndef CLVOL_STAGES_INTERSECT_H
 #define CLVOL_STAGES_INTERSECT_H
+#include "geometry/bvh.h"
+#include "geometry/interval.h"
+#if CLVOL_CAMERA_INSIDE
+#include "stages/boundary.h"
+#endif
+#include "stages/hit.h"
+#if CLVOL_HAS_STRETCHES
+#include "stages/media.h"
+#endif
+#include "stages/path.h"
 
 #if CLVOL_HAS_SURFACES
 /* Finds the first surface beyond those already passed. */

@@ -1,6 +1,8 @@
 /* How walks are cut so that no launch takes long: in legs, each in a wave of its own (see WALK_STEPS). */
 #ifndef CLVOL_STAGES_LEGS_H
 #define CLVOL_STAGES_LEGS_H
+#if CLVOL_HAS_MEDIA
+#include "core/random.h"
 #include "tracking/interface.h"
 
 /* The random numbers of a leg: those of the walk's block, and for later ones what they key. */
@@ -54,4 +56,5 @@ INLINE bool goes_on(Walked walked, Tally *tally)
         set_path_##prefix##walked_rest(scene, slot, walked.rest); \
     }
 
+#endif
 #endif

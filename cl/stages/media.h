@@ -5,6 +5,9 @@
    coefficients count. */
 #ifndef CLVOL_STAGES_MEDIA_H
 #define CLVOL_STAGES_MEDIA_H
+#if CLVOL_HAS_MEDIA
+#include "core/scene.h"
+#include "geometry/interval.h"
 #include "stages/medium_ray.h"
 
 INLINE int medium_presence(const Scene *scene, uint m, const Inside *inside)
@@ -72,4 +75,5 @@ INLINE uint walk_number(const Scene *scene, uint stretch, int m)
     return stretch * scene->render->media + (uint)m;
 }
 
+#endif
 #endif

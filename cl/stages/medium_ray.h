@@ -1,6 +1,7 @@
 /* A path's ray inside one medium, as trackers take it. */
 #ifndef CLVOL_STAGES_MEDIUM_RAY_H
 #define CLVOL_STAGES_MEDIUM_RAY_H
+#if CLVOL_HAS_MEDIA
 #include "tracking/interface.h"
 
 INLINE bool is_homogeneous(__global const Medium *medium)
@@ -31,4 +32,5 @@ INLINE MediumRay medium_ray(const Scene *scene, __global const Medium *medium, R
     return in;
 }
 
+#endif
 #endif

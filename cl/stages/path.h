@@ -4,6 +4,8 @@
    wait for each other.  A queue holds slot numbers; its order is not defined and nothing depends on it. */
 #ifndef CLVOL_STAGES_PATH_H
 #define CLVOL_STAGES_PATH_H
+#include "core/random.h"
+#include "core/scene.h"
 #include "tracking/tally.h"
 
 #define NO_JOB 0xFFFFFFFFu

@@ -5,6 +5,10 @@
    since no stage may push to the queue that it reads. */
 #ifndef CLVOL_STAGES_SHADE_H
 #define CLVOL_STAGES_SHADE_H
+#include "stages/collision_scatter.h"
+#include "stages/escape.h"
+#include "stages/path.h"
+#include "stages/surface_scatter.h"
 
 INLINE void shade(const Scene *scene, uint group, uint slot)
 {

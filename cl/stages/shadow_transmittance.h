@@ -1,7 +1,24 @@
 /* Attenuates one next-event ray by everything on its way and adds what arrives. */
 #ifndef CLVOL_STAGES_SHADOW_TRANSMITTANCE_H
 #define CLVOL_STAGES_SHADOW_TRANSMITTANCE_H
-#include "tracking/tally.h"
+#if CLVOL_NEE
+#include "core/sampler.h"
+#include "geometry/bvh.h"
+#if CLVOL_HAS_PASSABLE
+#include "bsdf/bsdf.h"
+#include "stages/boundary.h"
+#include "stages/side.h"
+#endif
+#if CLVOL_HAS_AREA
+#include "geometry/surface.h"
+#endif
+#include "stages/legs.h"
+#include "stages/media.h"
+#include "stages/path.h"
+#if CLVOL_HAS_HETEROGENEOUS
+#include CLVOL_TRANSMITTANCE_HEADER
+#endif
+#include "tracking/homogeneous_transmittance.h"
 
 #if CLVOL_HAS_HETEROGENEOUS
 CLVOL_WALKED_FIELD(shadow_)
@@ -226,4 +243,5 @@ INLINE uint shadow_transmittance(const Scene *scene, uint group, uint slot)
     return steps_of(&tally);
 }
 
+#endif
 #endif

@@ -1,6 +1,9 @@
 /* The material of the side that a surface is seen from. */
 #ifndef CLVOL_STAGES_SIDE_H
 #define CLVOL_STAGES_SIDE_H
+#if CLVOL_HAS_SURFACES
+#include "bsdf/bsdf.h"
+#include "core/scene.h"
 
 /* A surface as the side it is seen from has it.  Materials that do not let light through are always seen
    from their front. */
@@ -23,4 +26,5 @@ INLINE bool side_of(const Scene *scene, __global const Shape *shape, float3 wi, 
 
 INLINE float3 on_side(const Side *side, float3 d) { return (float3)(d.x, d.y, side->side * d.z); }
 
+#endif
 #endif

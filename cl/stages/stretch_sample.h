@@ -7,6 +7,10 @@
    short of its end counts as if it had collided there; if that is the nearest, all go on from there. */
 #ifndef CLVOL_STAGES_STRETCH_SAMPLE_H
 #define CLVOL_STAGES_STRETCH_SAMPLE_H
+#include "core/sampler.h"
+#include "stages/media.h"
+#include "stages/medium_collision.h"
+#include "stages/path.h"
 
 /* The factor by which a walk changed the path's weight; what had no weight keeps none. */
 INLINE Spectrum weight_ratio(Spectrum after, Spectrum before)

@@ -2,6 +2,18 @@
    surface's BSDF. */
 #ifndef CLVOL_STAGES_SURFACE_SCATTER_H
 #define CLVOL_STAGES_SURFACE_SCATTER_H
+#if CLVOL_HAS_SURFACES
+#include "bsdf/bsdf.h"
+#include "core/sampler.h"
+#include "emitter/area.h"
+#include "emitter/emitter.h"
+#include "geometry/surface.h"
+#include "stages/bounce.h"
+#include "stages/boundary.h"
+#include "stages/first_hit.h"
+#include "stages/hit.h"
+#include "stages/path.h"
+#include "stages/side.h"
 
 #if CLVOL_HAS_PASSABLE
 /* The ray goes straight on behind the surface: no scattering, and no bounce. */
@@ -155,4 +167,5 @@ INLINE bool shade_surface(const Scene *scene, uint group, uint slot)
 #endif
 }
 
+#endif
 #endif

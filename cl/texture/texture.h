@@ -2,9 +2,9 @@
 
    A texel (x, y) is centred at ((x + 1/2) / width, (y + 1/2) / height), row 0 at v = 0; bilinear look-ups wrap each
    of their four texels. */
-#ifndef CLVOL_TEXTURE_H
-#define CLVOL_TEXTURE_H
-#include "core/types.h"
+#ifndef CLVOL_TEXTURE_TEXTURE_H
+#define CLVOL_TEXTURE_TEXTURE_H
+#include "core/scene.h"
 
 #if CLVOL_HAS_TEXTURES
 #if CLVOL_HAS_BITMAPS

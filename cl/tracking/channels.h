@@ -3,6 +3,7 @@
    every channel is then weighted over the mixture of all channels' densities, which keeps the mean weight. */
 #ifndef CLVOL_TRACKING_CHANNELS_H
 #define CLVOL_TRACKING_CHANNELS_H
+#include "core/random.h"
 #include "tracking/interface.h"
 
 INLINE Extinction exp_of_minus(Extinction depth)

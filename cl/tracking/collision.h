@@ -1,6 +1,9 @@
 /* What a technique fills in. */
 #ifndef CLVOL_TRACKING_COLLISION_H
 #define CLVOL_TRACKING_COLLISION_H
+#if CLVOL_EMISSION_ON_WALKS
+#include "medium/emission.h"
+#endif
 #include "tracking/interface.h"
 #include "tracking/record.h"
 

@@ -1,6 +1,8 @@
 /* The loop that most trackers are: a walk at rate sigma_maj, with the majorant of each cell as its bound. */
 #ifndef CLVOL_TRACKING_FLIGHT_H
 #define CLVOL_TRACKING_FLIGHT_H
+#include "core/random.h"
+#include "majorant/majorant.h"
 #include "tracking/walk.h"
 
 /* A walk of rate sigma_maj, from tentative collision to tentative collision through all cells. */

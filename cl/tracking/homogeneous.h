@@ -1,6 +1,8 @@
 /* Homogeneous media: free flights by the closed form, no majorant and no look-up. */
 #ifndef CLVOL_TRACKING_HOMOGENEOUS_H
 #define CLVOL_TRACKING_HOMOGENEOUS_H
+#if CLVOL_HAS_HOMOGENEOUS
+#include "core/random.h"
 #include "tracking/channels.h"
 #include "tracking/collision.h"
 
@@ -56,4 +58,5 @@ INLINE bool homogeneous_collision(const MediumRay *in, uint first, Stream *strea
     return real_collision(t, tally, collision);
 }
 
+#endif
 #endif

@@ -13,6 +13,7 @@
    Both may stop short, with stop_walk(): what they return then holds up to there, with no collision so far. */
 #ifndef CLVOL_TRACKING_INTERFACE_H
 #define CLVOL_TRACKING_INTERFACE_H
+#include "core/scene.h"
 #include "tracking/tally.h"
 
 /* A walk goes in legs, so that no launch takes long: after WALK_STEPS steps it stops where it is, and another walk

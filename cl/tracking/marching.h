@@ -1,5 +1,6 @@
 /* Ray marching, a BIASED baseline: the density is taken as constant over fixed steps, one jittered
    look-up each; the collision lies where the summed optical depth reaches an exponential variate. */
+#include "core/random.h"
 #include "tracking/collision.h"
 #include "tracking/walk.h"
 

@@ -4,6 +4,8 @@
    tau is estimated by a comb: look-ups at even steps of the majorant's optical depth, with one random offset,
    each worth step * sigma_t / sigma_maj (Kettunen et al. 2021).  The pivot c is such an estimate itself,
    drawn apart, so that the factors are small. */
+#include "core/random.h"
+#include "majorant/majorant.h"
 #include "tracking/transmittance.h"
 
 /* Look-ups of a comb per unit of the majorant's optical depth, and at most: beyond that its even steps round

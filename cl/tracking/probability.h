@@ -2,6 +2,7 @@
    decide the noise and never the mean, since weights are divided by them. */
 #ifndef CLVOL_TRACKING_PROBABILITY_H
 #define CLVOL_TRACKING_PROBABILITY_H
+#include "core/scene.h"
 
 /* An event's probability but for a factor, given its coefficient in every channel. */
 INLINE float spectral_rate(float3 beta, float3 coefficient)

@@ -1,4 +1,4 @@
-/* Hooks through which `clvol ray` watches a walk.  Renders leave them empty; cl/ray/recorder.h, composed before
+/* Hooks through which `clvol ray` watches a walk.  Renders leave them empty; cl/ray/recorder.h, included before
    the trackers, fills them. */
 #ifndef CLVOL_TRACKING_RECORD_H
 #define CLVOL_TRACKING_RECORD_H

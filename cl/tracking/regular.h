@@ -6,6 +6,7 @@
    The majorant only tells where the medium is empty.  Several channels: the flight is drawn from one and
    weighted over the mixture (tracking/channels.h). */
 #include "density/segments.h"
+#include "majorant/majorant.h"
 #include "tracking/channels.h"
 #include "tracking/collision.h"
 

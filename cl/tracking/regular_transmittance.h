@@ -1,6 +1,7 @@
 /* Regular transmittance: the exact optical depth, piece by piece, no variance (METHODS §4).  The majorant only
    tells where the medium is empty. */
 #include "density/segments.h"
+#include "majorant/majorant.h"
 #include "tracking/transmittance.h"
 
 INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream *stream, Tally *tally)

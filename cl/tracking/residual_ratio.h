@@ -3,6 +3,8 @@
 
    Each majorant cell has a control per channel and one rate sigma_r of tentative collisions.  Unbiased for any
    rate; its relative variance is exp(integral of (sigma_t - sigma_c)² / sigma_r) - 1. */
+#include "core/random.h"
+#include "majorant/majorant.h"
 #include "tracking/transmittance.h"
 
 /* Optical depth of the control beyond which it is paid into the estimate: roulette has to see it, and over

@@ -10,6 +10,9 @@
    collides has its point before any place that it did not get to; for this the bound has to hold. */
 #ifndef CLVOL_TRACKING_THIN_EMISSION_H
 #define CLVOL_TRACKING_THIN_EMISSION_H
+#if CLVOL_EMISSION_ON_WALKS
+#include "core/random.h"
+#include "medium/emission.h"
 #include "tracking/collision.h"
 #include "tracking/walk.h"
 
@@ -53,4 +56,5 @@ INLINE Spectrum thin_emission(const MediumRay *in, uint first, Stream *stream, T
     return beta * depth * medium_source(in->scene, in->medium, in->world.o + t * in->world.d, in->channel);
 }
 
+#endif
 #endif

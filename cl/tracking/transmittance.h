@@ -1,6 +1,7 @@
 /* What the transmittance estimators share. */
 #ifndef CLVOL_TRACKING_TRANSMITTANCE_H
 #define CLVOL_TRACKING_TRANSMITTANCE_H
+#include "core/random.h"
 #include "tracking/channels.h"
 #include "tracking/walk.h"
 

@@ -4,6 +4,8 @@
    random number.  Positions are measured from the cell's entry, to stay fine far along the ray. */
 #ifndef CLVOL_TRACKING_WALK_H
 #define CLVOL_TRACKING_WALK_H
+#include "core/random.h"
+#include "density/lookup.h"
 #include "tracking/interface.h"
 #include "tracking/probability.h"
 #include "tracking/record.h"

@@ -1,7 +1,8 @@
 """From a KernelConfig to bound kernels: composes one translation unit per stage and builds it.
 
-Units are written out in full (includes expanded, `#line` kept), so that a dump is self-contained, no
-include path reaches the compiler, and drivers' caches see exactly what is compiled.
+Files under cl/ include what they use and guard what they hold; choices fill slots.  Units are written out in
+full (clvol.device.preprocess), so that a dump is self-contained, no include path reaches the compiler, and
+drivers' caches see exactly what is compiled.
 """
 
 from __future__ import annotations
@@ -9,22 +10,24 @@ from __future__ import annotations
 import re
 from functools import cache
 from importlib import resources
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import pyopencl as cl
 
 from clvol import layout
+from clvol.device.preprocess import Preprocessor
 from clvol.errors import DeviceError
 from clvol.planning import registry
-from clvol.tables.materials import BSDF_HEADERS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Mapping
 
     from clvol.device.device import Device
     from clvol.planning.config import KernelConfig
 
-_INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"')
+LAYOUT = "layout"
+"""What messages call the generated text of records, enums and path state."""
 BUILD_OPTIONS = ("-cl-std=CL1.2", "-w")
 """No relaxed-math flag: they may delete the checks for NaN and infinity (METHODS §7).  -w: compilers
 warn wherever a feature's macro makes a condition constant, which is how the kernels are composed."""
@@ -39,148 +42,46 @@ def kernel_source(name: str) -> str:
     return folder.joinpath(name).read_text(encoding="utf-8")
 
 
-def _expand(name: str, seen: set[str]) -> Iterator[str]:
-    """Lines of a file with its includes in place, each file once."""
-    if name in seen:
-        return
-    seen.add(name)
-    yield f'#line 1 "{name}"'
-    for number, line in enumerate(kernel_source(name).splitlines(), 1):
-        match = _INCLUDE.match(line)
-        if match:
-            yield from _expand(match[1], seen)
-            yield f'#line {number + 1} "{name}"'
-        else:
-            yield line
-
-
-def stage_headers(config: KernelConfig, stage: str) -> list[str]:
-    """Headers that a stage of this configuration needs, in order."""
-    features = config.features
-    walks = stage in ("medium_sample", "shadow_transmittance")
-    emits = (stage == "medium_sample" and features.emission and not features.media_overlap) or (
-        stage == "shade" and features.emission and features.media_overlap
-    )
-    scatters = stage == "shade" and (features.scattering or (bool(config.first_hit) and features.media > 0))
-    fields = (emits and (features.albedo_volumes or features.emission_volumes or features.temperature)) or (
-        scatters and features.albedo_volumes
-    )
-    headers = []
-    if walks and features.heterogeneous:
-        headers.append(registry.LOOKUPS[config.lookup].header)
-    elif fields:
-        headers.append("density/volume.h")
-    if emits:
-        headers.append("medium/emission.h")
-    elif scatters:
-        headers.append("medium/albedo.h")
-    if walks and features.heterogeneous:
-        chosen = config.tracker if stage == "medium_sample" else registry.TRANSMITTANCES[config.transmittance]
-        if chosen.walks_majorant:
-            headers.append(majorant_header(config))
-        headers.append(chosen.header)
-        if emits:
-            headers.append("tracking/thin_emission.h")
-    if walks and features.homogeneous:
-        analytic = "homogeneous" if stage == "medium_sample" else "homogeneous_transmittance"
-        headers.append(f"tracking/{analytic}.h")
-    materials = features.surfaces and (
-        stage == "shade" or (stage == "shadow_transmittance" and features.passable)
-    )
-    if materials:
-        headers += [*(["texture/texture.h"] if features.textures else []), *bsdf_headers(features.bsdfs)]
-    if stage == "shade":
-        if features.scattering:
-            headers.append("phase/phase.h")
-        if features.area:
-            headers += ["geometry/surface.h", "emitter/area.h"]
-        if features.envmap:
-            headers.append("emitter/envmap.h")
-        headers.append("emitter/emitter.h")
-    return headers + geometry_headers(config, stage)
-
-
-def majorant_header(config: KernelConfig) -> str:
-    """The header of the majorant's walk."""
-    return "majorant/tree_grid.h" if config.tree_grid else registry.MAJORANTS[config.majorant].header
-
-
-def geometry_headers(config: KernelConfig, stage: str) -> list[str]:
-    """Headers of what a stage knows of surfaces and of where media are."""
-    features = config.features
-    headers = []
-    crosses = {
-        "intersect": features.camera_inside,
-        "shade": features.surfaces > 0,
-        "shadow_transmittance": features.passable,
+def slots(config: KernelConfig) -> dict[str, str]:
+    """The files that choices fill in: what `#include CLVOL_..._HEADER` stands for under cl/."""
+    chosen = {
+        "SAMPLER": registry.SAMPLERS[config.sampler],
+        "TECHNIQUE": config.tracker,
+        "TRANSMITTANCE": registry.TRANSMITTANCES[config.transmittance],
+        "LOOKUP": registry.LOOKUPS[config.lookup],
     }
-    if features.surfaces and stage in crosses:
-        headers.append("geometry/bvh.h")
-        if stage != "shadow_transmittance":
-            headers.append("stages/hit.h")
-        elif features.area:
-            headers.append("geometry/surface.h")
-        if crosses[stage]:
-            headers += ["geometry/surface.h", "stages/boundary.h"]
-        if crosses[stage] and stage != "intersect":
-            headers.append("stages/side.h")
-    if features.media and stage in ("intersect", "medium_sample", "shadow_transmittance"):
-        headers.append("geometry/interval.h")
-        if features.stretches or stage == "shadow_transmittance":
-            headers.append("stages/media.h")
-        if stage != "intersect":
-            headers.append("stages/legs.h")
-    return headers
+    files = {name: choice.header for name, choice in chosen.items() if choice.header}
+    if config.majorant != "none":
+        grid = config.tree_grid
+        files["MAJORANT"] = "majorant/tree_grid.h" if grid else registry.MAJORANTS[config.majorant].header
+    return {f"CLVOL_{name}_HEADER": file for name, file in files.items()}
 
 
-def shade_headers(config: KernelConfig) -> list[str]:
-    """Headers of the events that shade handles."""
-    features = config.features
-    found = {
-        "stages/escape.h": features.constant or features.envmap,
-        "stages/bounce.h": features.surfaces or features.scattering,
-        "stages/first_hit.h": bool(config.first_hit),
-        "stages/surface_scatter.h": features.surfaces > 0,
-        "stages/collision_scatter.h": features.media > 0,
-    }
-    return [name for name, needed in found.items() if needed]
-
-
-def bsdf_headers(kinds: tuple[str, ...]) -> list[str]:
-    """Headers of the BSDFs that a scene uses, and the one that chooses among them."""
-    return [BSDF_HEADERS[kind] for kind in kinds if kind in BSDF_HEADERS] + ["bsdf/bsdf.h"]
-
-
-def compose(config: KernelConfig, headers: list[str], body: str) -> str:
-    """A translation unit: defines, layout, `headers`, then `body` (OpenCL text).
+def expand(text: str, macros: Mapping[str, int], slots: Mapping[str, str], records: str) -> str:
+    """A translation unit of `text` and all that it includes; `records` stands in core/scene.h.
 
     Only the macros that occur in it are defined: caches are keyed on the text, and stages that a choice
     does not touch are not built again.
     """
-    seen: set[str] = set()
-    lines = []
-    for name in ("core/types.h", "core/random.h"):
-        lines += _expand(name, seen)
-    lines += ['#line 1 "layout"', *layout.layout_text(config.macros).splitlines()]
-    reads = config.top_trees and any(name.startswith("density/") for name in headers)
-    trees = ["geometry/lattice_tree.h"] if reads else []
-    for name in (registry.SAMPLERS[config.sampler].header, *trees, *headers):
-        lines += _expand(name, seen)
-    for line in body.splitlines():
-        match = _INCLUDE.match(line)
-        lines += _expand(match[1], seen) if match else [line]
-    text = "\n".join(lines) + "\n"
-    used = set(re.findall(r"\bCLVOL_\w+", text))
-    defines = [f"#define {name} {value}\n" for name, value in config.macros.items() if name in used]
-    return "/* Composed by clvol. */\n" + "".join(defines) + text
+
+    def read(name: str) -> str:
+        return records if name == LAYOUT else kernel_source(name)
+
+    expanded = Preprocessor(read, macros, {**slots, "CLVOL_LAYOUT_HEADER": LAYOUT}).expand(text, "unit")
+    body = "\n".join(expanded) + "\n"
+    used = set(re.findall(r"\bCLVOL_\w+", body))
+    defines = [f"#define {name} {value}\n" for name, value in macros.items() if name in used]
+    return "/* Composed by clvol. */\n" + "".join(defines) + body
+
+
+def compose(config: KernelConfig, text: str, macros: Mapping[str, int] = MappingProxyType({})) -> str:
+    """The translation unit of `text` for a configuration, and more macros."""
+    return expand(text, {**config.macros, **macros}, slots(config), layout.layout_text(config.macros))
 
 
 def stage_source(config: KernelConfig, stage: str) -> str:
     """The composed source of one stage kernel, or of `accumulate`."""
-    headers = [] if stage == "accumulate" else [*stage_headers(config, stage), "stages/path.h"]
-    if stage == "shade":
-        headers += shade_headers(config)
-    return compose(config, headers, f'#include "kernels/{stage}.cl"\n')
+    return compose(config, f'#include "kernels/{stage}.cl"\n')
 
 
 def build(device: Device, source: str, name: str) -> cl.Program:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from clvol.layout.arguments import arguments
+from clvol.layout.arguments import ARGUMENTS, arguments
 from clvol.layout.constants import BLACKBODY_BINS, BLACKBODY_MIDDLE_KELVIN, COUNTER_STRIDE
 from clvol.layout.path_state import (
     Macros,
@@ -37,10 +37,7 @@ def layout_text(macros: Macros) -> str:
     for family, names in ENUMS.items():
         parts += [f"#define {family}_{name.upper()} {value}" for value, name in enumerate(names)]
     parts += [f"#define QUEUE_COUNT {len(ENUMS['QUEUE'])}", f"#define COUNTER_STRIDE {COUNTER_STRIDE}u"]
-    args = arguments(macros)
-    parts.append("typedef struct {\n" + "\n".join(f"    {a.c_type} {a.name};" for a in args) + "\n} Scene;")
-    parts.append("#define CLVOL_ARGUMENTS " + ", ".join(f"{a.c_type} {a.name}_" for a in args))
-    parts.append("#define CLVOL_SCENE {" + ", ".join(f"{a.name}_" for a in args) + "}")
+    parts += _scene_text(macros)
     for index, field in enumerate(path_fields(macros)):
         at = f"scene->state[{index}u * scene->slot_stride + slot]"
         get, put = (f"as_float({at})", "as_uint(value)") if field.kind == "f" else (at, "(uint)(value)")
@@ -56,6 +53,17 @@ def layout_text(macros: Macros) -> str:
     parts += _counts_text(macros)
     parts += _inside_text(macros) + _first_hit_text(macros)
     return "\n".join(parts) + "\n"
+
+
+def _scene_text(macros: Macros) -> list[str]:
+    """The kernels' arguments, and the Scene that holds them; what is no argument is null there."""
+    args = arguments(macros)
+    members = "\n".join(f"    {a.c_type} {a.name};" for a in ARGUMENTS)
+    return [
+        f"typedef struct {{\n{members}\n}} Scene;",
+        "#define CLVOL_ARGUMENTS " + ", ".join(f"{a.c_type} {a.name}_" for a in args),
+        "#define CLVOL_SCENE {" + ", ".join(f"{a.name}_" if a in args else "0" for a in ARGUMENTS) + "}",
+    ]
 
 
 def _first_hit_text(macros: Macros) -> list[str]:

@@ -22,18 +22,6 @@ from clvol.tables.textures import TextureTable, mean_color
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-BSDF_HEADERS = {
-    "DIFFUSE": "bsdf/diffuse.h",
-    "DIELECTRIC": "bsdf/dielectric.h",
-    "THIN_DIELECTRIC": "bsdf/dielectric.h",
-    "ROUGH_DIELECTRIC": "bsdf/rough_dielectric.h",
-    "CONDUCTOR": "bsdf/conductor.h",
-    "ROUGH_CONDUCTOR": "bsdf/rough_conductor.h",
-    "PLASTIC": "bsdf/plastic.h",
-    "ROUGH_PLASTIC": "bsdf/rough_plastic.h",
-}
-"""Kind of BSDF -> its header, included before bsdf/bsdf.h; NULL needs none."""
-
 BLACK = -1
 """Number of the material that absorbs everything: the back of what has only a front."""
 

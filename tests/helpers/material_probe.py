@@ -9,7 +9,7 @@ from clvol.scene import bsdf, texture
 from clvol.scene.library import Library
 from clvol.scene.nodes import from_dict
 from clvol.scene.reader import build
-from clvol.tables.materials import BSDF_HEADERS, material_table
+from clvol.tables.materials import material_table
 
 PLUGINS = {
     "bsdf": {
@@ -86,20 +86,15 @@ def source(kinds, channel=None, textures=True):
     defines = {f"CLVOL_BSDF_{kind}": int(kind in kinds) for kind in layout.BSDFS}
     defines |= {"CLVOL_HAS_TEXTURES": +textures, "CLVOL_HAS_BITMAPS": +textures, "CLVOL_EXTINCTION": 1}
     defines |= {"CLVOL_SPECTRUM": 3 if channel is None else 1, "CLVOL_ONE_CHANNEL_PER_PATH": 1}
-    defines["CHANNEL"] = channel or 0
     buffers = ("const Material *materials", "const Texture *textures", "const float *texels")
     buffers = [f"__global {buffer}" for buffer in (*buffers, "const float *material_tables")]
-    seen = set()
-    lines = [f"#define {name} {value}" for name, value in defines.items()]
-    lines += programs._expand("core/types.h", seen)
-    lines += [layout.record_text(name, layout.RECORDS[name]) for name in ("Material", "Texture")]
+    lines = [layout.record_text(name, layout.RECORDS[name]) for name in ("Material", "Texture")]
     for family in ("MATERIAL", "DISTRIBUTION", "TEXTURE", "WRAP"):
         lines += [f"#define {family}_{n.upper()} {v}" for v, n in enumerate(layout.ENUMS[family])]
     lines.append("typedef struct {" + "".join(f"{buffer}; " for buffer in buffers) + "} Scene;")
     lines.append("#define SCENE " + ", ".join(f"{buffer}_" for buffer in buffers))
-    for header in dict.fromkeys(BSDF_HEADERS[kind] for kind in layout.BSDFS if kind in kinds - {"NULL"}):
-        lines += programs._expand(header, seen)
-    return "\n".join([*lines, *programs._expand("bsdf/bsdf.h", seen), BODY])
+    lines.append(f"#define CHANNEL {channel or 0}")
+    return programs.expand('#include "bsdf/bsdf.h"\n' + BODY, defines, {}, "\n".join(lines))
 
 
 class Samples:

@@ -96,7 +96,10 @@ class Probe:
         extra = "".join(f", __global {c_types[a.dtype.kind]} *{name}" for name, a in names)
         source = programs.compose(
             self.config,
-            [*headers],
+            "".join(
+                f'#include "{name}"\n' if name.endswith(".h") else f"#include {name}\n" for name in headers
+            )
+            + '#include "core/sampler.h"\n'
             f"__kernel void probe(CLVOL_ARGUMENTS{extra}, uint count)\n{{\n"
             "    const Scene scene_ = CLVOL_SCENE;\n    const Scene *scene = &scene_;\n"
             f"    const uint i = get_global_id(0);\n    if (i >= count)\n        return;\n{body}\n}}\n",

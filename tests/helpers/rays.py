@@ -46,19 +46,15 @@ def ray_source(stack, triangles=True, quadrics=False, kernels=_KERNELS):
     flags = {"CLVOL_SPECTRUM": 1, "CLVOL_EXTINCTION": 1, "CLVOL_ONE_CHANNEL_PER_PATH": 0}
     flags |= {"CLVOL_HAS_TRIANGLES": int(triangles), "CLVOL_HAS_QUADRICS": int(quadrics)}
     flags |= {"CLVOL_BVH_STACK": stack}
-    flags |= {f"QUADRIC_{name.upper()}": number for name, number in QUADRIC_KINDS.items()}
-    seen = set()
-    return "\n".join(
-        [
-            *(f"#define {name} {value}" for name, value in flags.items()),
-            *programs._expand("core/types.h", seen),
-            layout.record_text("Quadric", layout.QUADRIC),
-            "typedef struct { __global const float8 *bvh_nodes, *bvh_triangles; "
-            "__global const Quadric *quadrics; } Scene;",
-            *programs._expand("geometry/bvh.h", seen),
-            kernels.replace("ARGUMENTS", _ARGUMENTS).replace("BEGIN", _BEGIN),
-        ]
-    )
+    flags |= {"CLVOL_HAS_SURFACES": 1}
+    scene = [
+        *(f"#define QUADRIC_{name.upper()} {number}" for name, number in QUADRIC_KINDS.items()),
+        layout.record_text("Quadric", layout.QUADRIC),
+        "typedef struct { __global const float8 *bvh_nodes, *bvh_triangles; "
+        "__global const Quadric *quadrics; } Scene;",
+    ]
+    text = kernels.replace("ARGUMENTS", _ARGUMENTS).replace("BEGIN", _BEGIN)
+    return programs.expand('#include "geometry/bvh.h"\n' + text, flags, {}, "\n".join(scene))
 
 
 def directions(generator, count):

@@ -7,7 +7,6 @@ from fields import CHROMATIC, FIELDS, RAYS, exit_distance, optical_depth
 from probe import grid_volume, scene_of
 from stat_tests import chi2_p_value, require_samples, z_score
 
-from clvol.device import programs
 from clvol.planning import registry
 from clvol.scene.records import ConstVolume, Medium
 
@@ -93,8 +92,9 @@ def exact_depth(field, ray):
 
 def headers_of(config, family):
     """What a kernel round one tracker includes."""
-    stage = "medium_sample" if family == "technique" else "shadow_transmittance"
-    return [*programs.stage_headers(config, stage), "stages/medium_ray.h"]
+    analytic = {"technique": "homogeneous", "transmittance": "homogeneous_transmittance"}[family]
+    chosen = [f"CLVOL_{family.upper()}_HEADER"] if config.features.heterogeneous else []
+    return [*chosen, f"tracking/{analytic}.h", "stages/medium_ray.h"]
 
 
 def record_of(probe, ray, length, channel=0):

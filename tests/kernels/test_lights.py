@@ -45,7 +45,7 @@ PRESENT = (
     "QUADRICS",
     "SHADING_NORMALS",
 )
-DEFINES = {"NEE": 1, "SPECTRUM": 3, "EXTINCTION": 1, "ONE_CHANNEL_PER_PATH": 0}
+DEFINES = {"NEE": 1, "SPECTRUM": 3, "EXTINCTION": 1, "ONE_CHANNEL_PER_PATH": 0, "BVH_STACK": 1}
 ABSENT = ("ENVMAP", "VERTEX_UVS")
 
 BUFFERS = {
@@ -125,21 +125,17 @@ __kernel void choose_kernel(ARGUMENTS, __global const float *in, __global float 
 
 def source(present=PRESENT, buffers=BUFFERS, kernels=KERNELS):
     """One unit with every kind of light.  No ray is traced: a Hit is all that is needed of the tree."""
-    text = [f"#define CLVOL_{name} {value}" for name, value in DEFINES.items()]
-    text += [f"#define CLVOL_HAS_{name} {int(name in present)}" for name in (*PRESENT, *ABSENT)]
-    seen = {"geometry/bvh.h"}
-    for name in ("core/types.h", "core/random.h"):
-        text += programs._expand(name, seen)
-    text += [layout.record_text(name, dtype) for name, dtype in layout.RECORDS.items()]
+    macros = {f"CLVOL_{name}": value for name, value in DEFINES.items()}
+    macros |= {f"CLVOL_HAS_{name}": int(name in present) for name in (*PRESENT, *ABSENT)}
+    macros["CLVOL_HAS_SURFACES"] = macros["CLVOL_HAS_AREA"]
+    text = [layout.record_text(name, dtype) for name, dtype in layout.RECORDS.items()]
     for family, names in layout.ENUMS.items():
         text += [f"#define {family}_{name.upper()} {value}" for value, name in enumerate(names)]
-    text.append("#define NO_PRIMITIVE 0xFFFFFFFFu")
-    text.append("typedef struct {float t, u, v; uint primitive;} Hit;")
-    fields = (f"__global const {kind} *{name};" for name, kind in buffers.items())
+    tree = dict.fromkeys(("bvh_nodes", "bvh_triangles"), "float8")
+    fields = (f"__global const {kind} *{name};" for name, kind in (buffers | tree).items())
     text.append("typedef struct {" + " ".join(fields) + "} Scene;")
-    for name in (*(("emitter/area.h",) if "AREA" in present else ()), "emitter/emitter.h"):
-        text += programs._expand(name, seen)
-    return "\n".join([*text, kernels])
+    headers = "".join(f'#include "{name}.h"\n' for name in ("core/random", "emitter/area", "emitter/emitter"))
+    return programs.expand(headers + kernels, macros, {}, "\n".join(text))
 
 
 def rows(matrix):

@@ -1,12 +1,12 @@
 """The renderer's device functions round one ray: small kernels that read the scene as a render does.
 
-What they run is composed from the headers of the configuration's own stages, with hooks that record the walk
+What they run is the headers that the configuration's own stages include, with hooks that record the walk
 (cl/ray/recorder.h); nothing of a tracker is repeated here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,7 +30,6 @@ OUTCOME_SIZE, EVENT_SIZE, CELL_SIZE = 9, 5, 10
 MOST_EVENTS = 4096
 """Events of a walk that are recorded; later ones are only counted."""
 MOST_CELLS = 1 << 16
-STAGES = {"technique": "medium_sample", "transmittance": "shadow_transmittance"}
 
 
 @dataclass(eq=False)
@@ -55,15 +54,12 @@ class RayKernels:
     def places(self, origin: np.ndarray, direction: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
         """Surfaces on a ray, float32 (n, 3): t, number, entering; and each medium's interval, float64
         (media, 2): single precision would round the length of a thin one away."""
-        features = self.config.features
         media = len(self.prepared.boundaries.entries)
         hits, intervals = np.full((most, 3), np.inf, np.float32), np.empty((media, 3), np.float32)
-        headers = ["geometry/interval.h"] if media else []
-        headers += ["geometry/bvh.h", "geometry/surface.h"] if features.surfaces else []
         if media:
             given = np.concatenate([origin, direction]).astype(np.float32)
             sizes = np.uint32(media), np.uint32(most)
-            self._run(1, "places", headers, "", [given], [hits, intervals], sizes)
+            self._run(1, "places", {}, [given], [hits, intervals], sizes)
         return hits[np.isfinite(hits[:, 0])], intervals[:, :1].astype(float) + intervals[:, 1:]
 
     def tables(
@@ -73,19 +69,15 @@ class RayKernels:
         (n, CELL_SIZE), None where `family` walks none or is None."""
         channels = 3 if self.config.features.chromatic_extinction else 1
         walks = family is not None and self._tracker(family).walks_majorant
-        defines = {
-            "WALKS_MAJORANT": walks,
-            "HAS_CONTROLS": family == "technique" and self.config.needs_controls,
-            "HAS_RESIDUALS": family == "transmittance" and self.config.needs_residuals,
+        macros = {
+            "CLVOL_RAY_MAJORANT": walks,
+            "CLVOL_RAY_CONTROLS": family == "technique" and self.config.needs_controls,
+            "CLVOL_RAY_RESIDUALS": family == "transmittance" and self.config.needs_residuals,
         }
         sigma = np.empty((channels, points), np.float32)
         cells, count = np.full((MOST_CELLS, CELL_SIZE), np.nan, np.float32), np.zeros(1, np.uint32)
         sizes = [np.uint32(n) for n in (points, channels, MOST_CELLS)]
-        text = "".join(f"#define {name}\n" for name, wanted in defines.items() if wanted)
-        headers = [registry.LOOKUPS[self.config.lookup].header] if self.config.features.heterogeneous else []
-        headers += [programs.majorant_header(self.config)] if walks else []
-        headers += ["tracking/walk.h"] if headers else []
-        self._run(points, "tables", headers, text, [given], [sigma, cells, count], sizes)
+        self._run(points, "tables", macros, [given], [sigma, cells, count], sizes)
         return sigma, cells[: int(count[0])].copy() if walks else None
 
     def walks(
@@ -94,11 +86,10 @@ class RayKernels:
         """Outcomes of walks, float32 (walks, OUTCOME_SIZE), and events of the first, each (n, EVENT_SIZE)."""
         outcomes = np.empty((walks, OUTCOME_SIZE), np.float32)
         log = np.zeros((recorded, MOST_EVENTS, EVENT_SIZE), np.float32)
-        headers = ["ray/recorder.h", *programs.stage_headers(self.config, STAGES[family])]
-        text = "#define COLLISIONS\n" if family == "technique" else ""
+        macros = {"CLVOL_RAY_COLLISIONS": family == "technique"}
         sizes = [np.uint32(n) for n in (walks, recorded, MOST_EVENTS)]
         seeds = cl.cltypes.make_uint2(*seed_words(seed))
-        self._run(walks, "walks", headers, text, [given], [outcomes, log], [seeds, *sizes])
+        self._run(walks, "walks", macros, [given], [outcomes, log], [seeds, *sizes])
         return outcomes, [events[: int(o[-1])] for events, o in zip(log, outcomes, strict=False)]
 
     def _tracker(self, family: str) -> registry.Choice:
@@ -112,14 +103,14 @@ class RayKernels:
         self,
         count: int,
         name: str,
-        headers: list[str],
-        text: str,
+        macros: Mapping[str, bool],
         inputs: list[np.ndarray],
         outputs: list[np.ndarray],
         scalars: Sequence[Any],
     ) -> None:
         """Run cl/ray/`name`.cl for `count` work-items; `outputs` go in and come back."""
-        source = programs.compose(self.config, headers, f'{text}#include "ray/{name}.cl"\n')
+        flags = {macro: int(value) for macro, value in macros.items()}
+        source = programs.compose(self.config, f'#include "ray/{name}.cl"\n', flags)
         kernel = cl.Kernel(programs.build(self.device, source, f"ray/{name}"), name)
         memory = self.device.memory
         unused = memory.allocate(4, "an argument", "")

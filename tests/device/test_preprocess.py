@@ -1,0 +1,111 @@
+"""Files under cl/ include what they use, hide what a scene does not, and hold nothing that is not used."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from clvol import layout
+from clvol.device import programs
+from clvol.device.preprocess import Preprocessor
+from clvol.planning import registry
+from clvol.planning.config import KernelConfig
+from clvol.planning.features import Features
+
+CL = Path(__file__).resolve().parents[2] / "cl"
+HEADERS = sorted(str(p.relative_to(CL)) for p in CL.rglob("*.h"))
+TEXTS = {str(p.relative_to(CL)): p.read_text(encoding="utf-8") for p in sorted(CL.rglob("*.[hc]*"))}
+
+FILES = {
+    "a.h": "#ifndef A_H\n#define A_H\nint a;\n#endif\n",
+    "guarded.h": '/* why */\n#ifndef G_H\n#define G_H\n#if CLVOL_X\n#include "a.h"\nint g;\n#endif\n#endif\n',
+    "branches.h": "#if CLVOL_N == 1\none\n#elif CLVOL_N > 1 && !CLVOL_X\nmany\n#else\nnone\n#endif\n",
+    "left.h": "#if CLVOL_X\n#ifdef __AVX__\nfast\n#else\nslow\n#endif\n#elif OTHER\nother\n#endif\nend\n",
+}
+
+
+def lines(text, slots=None, **macros):
+    """What is left of `text`, but for `#line`."""
+    expander = Preprocessor(FILES.__getitem__, {f"CLVOL_{n}": v for n, v in macros.items()}, slots or {})
+    return [line for line in expander.expand(text, "unit") if not line.startswith("#line")]
+
+
+def test_a_file_stands_once_and_where_it_comes_first():
+    assert lines('#include "a.h"\nb\n#include "a.h"\n') == [
+        "#ifndef A_H",
+        "#define A_H",
+        "int a;",
+        "#endif",
+        "b",
+    ]
+
+
+def test_a_file_of_which_nothing_is_left_leaves_no_trace():
+    assert lines('#include "guarded.h"\nend', X=0) == ["end"]
+    assert {"int a;", "int g;"} <= set(lines('#include "guarded.h"\nend', X=1))
+
+
+@pytest.mark.parametrize(
+    "n, x, left", [(1, 0, "one"), (1, 1, "one"), (2, 0, "many"), (2, 1, "none"), (0, 0, "none")]
+)
+def test_one_branch_is_left(n, x, left):
+    assert lines('#include "branches.h"', N=n, X=x) == [left]
+
+
+def test_what_macros_do_not_decide_is_left_to_the_compiler():
+    assert lines('#include "left.h"', X=1) == ["#ifdef __AVX__", "fast", "#else", "slow", "#endif", "end"]
+    assert lines('#include "left.h"', X=0) == ["#if OTHER", "other", "#endif", "end"]
+    assert lines("#if CLVOL_X\nx\n#endif", Y=1) == ["#if CLVOL_X", "x", "#endif"]
+
+
+def test_a_slot_is_filled_and_an_empty_one_is_noticed():
+    assert "int a;" in lines("#include CLVOL_CHOSEN", {"CLVOL_CHOSEN": "a.h"})
+    assert lines("#if CLVOL_X\n#include CLVOL_CHOSEN\n#endif", X=0) == []
+    with pytest.raises(KeyError):
+        lines("#include CLVOL_CHOSEN")
+
+
+def test_lines_are_numbered_as_in_their_files():
+    expander = Preprocessor(FILES.__getitem__, {"CLVOL_X": 0}, {})
+    text = 'first\n#if CLVOL_X\nhidden\n#endif\n#include "left.h"\nlast'
+    number, place, found = 0, "", {}
+    for line in expander.expand(text, "unit"):
+        if match := re.match(r'#line (\d+) "(.*)"', line):
+            number, place = int(match[1]), match[2]
+        else:
+            found[line] = (place, number)
+            number += 1
+    assert found["first"] == ("unit", 1) and found["last"] == ("unit", 6)
+    assert found["other"] == ("left.h", 8) and found["end"] == ("left.h", 10)
+
+
+# -- cl/ ---------------------------------------------------------------------------------------------
+
+
+def everything(**features):
+    """A configuration for which no file is empty, with light that is gathered on walks."""
+    found = {name: True for name, kind in Features.__annotations__.items() if kind == "bool"}
+    found |= {"media": 2, "volumes": 1, "surfaces": 1, "emitters": 1, "boundaries": 1, "bsdfs": layout.BSDFS}
+    found["media_overlap"] = False
+    choices = {"technique": "decomposition", "transmittance": "residual-ratio", "sampler": "sobol"}
+    return KernelConfig(Features(**found | features), **choices, aov=tuple(registry.AOVS), top_trees=True)
+
+
+@pytest.mark.parametrize("folder", sorted({name.split("/")[0] for name in HEADERS}))
+def test_every_header_includes_what_it_uses(device, folder):
+    """Each compiles by itself."""
+    config = everything()
+    for name in HEADERS:
+        if name.startswith(f"{folder}/"):
+            unit = programs.compose(config, f'#include "{name}"\n__kernel void nothing(void) {{}}\n')
+            assert f'"{name}"' in unit, f"{name} is empty"
+            programs.build(device, unit, name)
+
+
+def test_every_file_is_included_by_another_or_fills_a_slot():
+    included = {name for text in TEXTS.values() for name in re.findall(r'#include "(.+)"', text)}
+    chosen = {choice.header for family in registry.FAMILIES.values() for choice in family.values()}
+    assert set(HEADERS) - included - chosen == {"majorant/tree_grid.h"}, (
+        "that one, grids of sparse volumes take"
+    )
+    assert included <= set(HEADERS)
