@@ -19,38 +19,68 @@ from clvol.version import __version__
 if TYPE_CHECKING:
     from types import FrameType
 
-_EXPORTS = {
-    "compare": "clvol.lab.comparison",
-    "DeviceError": "clvol.errors",
-    "Error": "clvol.errors",
-    "load_dict": "clvol.scene",
-    "load_file": "clvol.scene",
-    "look_at": "clvol.scene",
-    "merge": "clvol.picture.merging",
-    "OptionError": "clvol.errors",
-    "render": "clvol.api",
-    "RenderError": "clvol.errors",
-    "Result": "clvol.picture.result",
-    "rotate": "clvol.scene",
-    "scale": "clvol.scene",
-    "Scene": "clvol.scene.records",
-    "SceneError": "clvol.errors",
-    "selftest": "clvol.lab.selftest",
-    "trace_ray": "clvol.lab.ray.trace",
-    "translate": "clvol.scene",
-    "VolumeError": "clvol.errors",
+    from clvol.api import render
+    from clvol.errors import DeviceError, Error, OptionError, RenderError, SceneError, VolumeError
+    from clvol.lab.comparison import Comparison, compare
+    from clvol.lab.ray.trace import trace_ray
+    from clvol.lab.ray.view import RayView
+    from clvol.lab.selftest import SelfTest, selftest
+    from clvol.picture.merging import merge
+    from clvol.picture.result import Result
+    from clvol.scene import load_dict, load_file, look_at, rotate, scale, translate
+    from clvol.scene.records import Scene
+
+__all__ = [
+    "Comparison",
+    "DeviceError",
+    "Error",
+    "OptionError",
+    "RayView",
+    "RenderError",
+    "Result",
+    "Scene",
+    "SceneError",
+    "SelfTest",
+    "VolumeError",
+    "__version__",
+    "compare",
+    "load_dict",
+    "load_file",
+    "look_at",
+    "merge",
+    "render",
+    "rotate",
+    "scale",
+    "selftest",
+    "trace_ray",
+    "translate",
+]
+
+_MODULES = {
+    "clvol.api": ["render"],
+    "clvol.errors": ["DeviceError", "Error", "OptionError", "RenderError", "SceneError", "VolumeError"],
+    "clvol.lab.comparison": ["Comparison", "compare"],
+    "clvol.lab.ray.trace": ["trace_ray"],
+    "clvol.lab.ray.view": ["RayView"],
+    "clvol.lab.selftest": ["SelfTest", "selftest"],
+    "clvol.picture.merging": ["merge"],
+    "clvol.picture.result": ["Result"],
+    "clvol.scene": ["load_dict", "load_file", "look_at", "rotate", "scale", "translate"],
+    "clvol.scene.records": ["Scene"],
 }
+"""The imports above, for those that run clvol rather than read it."""
+_EXPORTS = {name: module for module, names in _MODULES.items() for name in names}
 
-__all__ = ["__version__", *_EXPORTS]
+if not TYPE_CHECKING:  # who reads it looks the names up above, and finds those that are not there
 
-
-def __getattr__(name: str) -> object:
-    if name not in _EXPORTS:
-        raise AttributeError(f"module 'clvol' has no attribute {name!r}")
-    with _undisturbed():
-        value = getattr(import_module(_EXPORTS[name]), name)
-    globals()[name] = value
-    return value
+    def __getattr__(name: str) -> object:
+        """Import a public name when it is first used."""
+        if name not in _EXPORTS:
+            raise AttributeError(f"module 'clvol' has no attribute {name!r}")
+        with _undisturbed():
+            value = getattr(import_module(_EXPORTS[name]), name)
+        globals()[name] = value
+        return value
 
 
 @contextmanager

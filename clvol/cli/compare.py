@@ -10,6 +10,7 @@ import click
 from clvol.cli.messages import exit_by, logging_to, mention
 from clvol.cli.options import (
     ExplainedCommand,
+    F,
     RegistryNames,
     definitions_option,
     device_option,
@@ -39,7 +40,7 @@ class _Command(ExplainedCommand):
         return super().parse_args(ctx, args)
 
 
-def _names_options(command: Any) -> Any:
+def _names_options(command: F) -> F:
     """--techniques or --technique, and the same for every family of the registry."""
     from clvol.lab.names import plural
     from clvol.planning.registry import FAMILIES, FAMILY_PURPOSE

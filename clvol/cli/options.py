@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from clvol.errors import OptionError
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    _OptionType = click.ParamType[Any, Any]
+else:
+    _OptionType = click.ParamType  # generic from click 8.5 on
+
+F = TypeVar("F", bound="Callable[..., Any] | click.Command")
+"""What an option is added to, and what comes of it."""
+
 PILOT_HELP = [("auto:pilot", "measures, then picks the technique, transmittance and majorant left at auto")]
 
 
-class RegistryChoice(click.ParamType):
+class RegistryChoice(_OptionType):
     """A name of one family of `clvol.planning.registry`, or "auto"; the registry is read when it is needed.
 
     `pilot`: a technique may be "auto:pilot" too.
@@ -33,7 +43,7 @@ class RegistryChoice(click.ParamType):
 
         return f"[{'|'.join([*(automatic(self.name) if self.pilot else ['auto']), *self.entries()])}]"
 
-    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The value itself if it is known; OptionError with the known ones if not."""
         from clvol.planning.registry import check_choice
 
@@ -56,7 +66,7 @@ class RegistryNames(RegistryChoice):
         return split_names(self.name, value)
 
 
-class Definition(click.ParamType):
+class Definition(_OptionType):
     """A `name=value` pair that fills a scene's <default>."""
 
     name = "name=value"
@@ -71,7 +81,7 @@ class Definition(click.ParamType):
         return name, text
 
 
-class SampleRange(click.ParamType):
+class SampleRange(_OptionType):
     """First sample and how many, as "4,12"."""
 
     name = "first,count"
@@ -96,7 +106,7 @@ def finite(ctx: click.Context, param: click.Parameter, value: float | None) -> f
     return value
 
 
-def positive_option(*names: str, **settings: Any) -> Any:
+def positive_option(*names: str, **settings: Any) -> Callable[[F], F]:
     """An option that takes a finite number above 0."""
     above_zero = click.FloatRange(min=0, min_open=True)
     return click.option(*names, type=above_zero, callback=finite, **settings)
@@ -125,14 +135,14 @@ step_option = positive_option(
 )
 
 
-def family_options(*left_out: str, pilot: bool = False) -> Any:
+def family_options(*left_out: str, pilot: bool = False) -> Callable[[F], F]:
     """An option for every family of the registry but those left out: a name of it, "auto" by default.
 
     `pilot`: a technique may be "auto:pilot" too.
     """
     from clvol.planning.registry import FAMILIES, FAMILY_PURPOSE
 
-    def add(command: Any) -> Any:
+    def add(command: F) -> F:
         for family in reversed([family for family in FAMILIES if family not in left_out]):
             kind, text = RegistryChoice(family, pilot), FAMILY_PURPOSE[family]
             command = click.option(f"--{family}", type=kind, default="auto", help=text)(command)

@@ -14,6 +14,7 @@ from clvol.cli.options import definitions_option, device_option, positive_option
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.progress import TaskID
 
     from clvol.lab.judgement import Tested
     from clvol.lab.selftest import SelfTest
@@ -103,7 +104,7 @@ class _Steps:
 
         columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
         self._bar = Progress(*columns, console=console, disable=not console.is_terminal, transient=True)
-        self._tasks: dict[str, int] = {}
+        self._tasks: dict[str, TaskID] = {}
 
     def __enter__(self) -> _Steps:
         self._bar.start()
@@ -149,8 +150,12 @@ def table_of(found: SelfTest, width: int = 0) -> list[str]:
 
 def wrapped(text: str, width: int, indent: str = "") -> list[str]:
     """Lines of at most so many columns, broken between words; the text itself for a width of 0."""
-    whole = {"break_long_words": False, "break_on_hyphens": False}
-    lines = textwrap.wrap(text, width, subsequent_indent=indent, **whole) if width else [text]
+    lines = [text]
+    if width:
+        wrapper = textwrap.TextWrapper(
+            width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
+        )
+        lines = wrapper.wrap(text)
     return [line.replace(TOGETHER, " ") for line in lines]
 
 

@@ -66,7 +66,12 @@ def kernel_folder() -> KernelFolder:
 def _folder_of_process() -> str:
     """A folder that is removed when this process, not one forked from it, ends."""
     path, process = tempfile.mkdtemp(prefix="clvol-kernels-"), os.getpid()
-    atexit.register(lambda: os.getpid() == process and shutil.rmtree(path, ignore_errors=True))
+
+    def remove() -> None:
+        if os.getpid() == process:
+            shutil.rmtree(path, ignore_errors=True)
+
+    atexit.register(remove)
     return path
 
 

@@ -52,9 +52,7 @@ class DeviceMemory:
             sizes = f"a buffer of {_megabytes(size)}, where {_megabytes(self.largest)} are allowed"
             raise DeviceError(f"{what} needs {sizes} on {self.name}", hint=hint)
         self.require(size, what, hint)
-        flags = cl.mem_flags.READ_WRITE
-        if array is not None:
-            flags |= cl.mem_flags.COPY_HOST_PTR
+        flags = cl.mem_flags.READ_WRITE | (0 if array is None else cl.mem_flags.COPY_HOST_PTR)
         try:
             buffer = Buffer(self.context, flags, 0 if array is not None else max(size, 4), hostbuf=array)
         except cl.Error as error:

@@ -61,8 +61,10 @@ class Agreement:
 
 
 class _Means(NamedTuple):
-    """Means over regions of an image; the variance of one round of each, with the variance of that variance
-    (halved) for a normal distribution: arrays (regions y, regions x, planes).
+    """Means over regions of an image, and the variance of one round of each.
+
+    Also the variance of that variance (halved) for a normal distribution: arrays (regions y, regions x,
+    planes).
 
     pixels : of a region, (regions y, regions x, 1).
     largest : what one sample is known to add to a pixel of a round, (planes,).
@@ -196,8 +198,10 @@ def _welch(a: _Means, b: _Means, spp: tuple[int, int] | None) -> _Tests:
 
 
 def _missed(dark: _Means, bright: _Means) -> np.ndarray:
-    """Probability of having missed all samples that `dark` lacks, each its largest (Poisson); 0 where it is
-    not darker."""
+    """Probability of having missed all samples that `dark` lacks, each its largest (Poisson).
+
+    It is 0 where `dark` is not darker.
+    """
     lacking, unit = bright.mean - dark.mean, np.broadcast_to(dark.unit, dark.mean.shape)
     known = (lacking > 0) & (unit > 0)
     return np.exp(-np.divide(lacking, unit, out=np.full_like(lacking, math.inf), where=known))

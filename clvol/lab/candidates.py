@@ -27,8 +27,11 @@ _LATE = 1000.0  # precomputation that leaves no time counts as if it left this p
 
 
 def clock(device: Device) -> float:
-    """Seconds of this process where it renders on a processor, so that other programs on it do not count; of
-    the wall clock elsewhere.  A processor's threads all count: renders keep them busy, precomputation one."""
+    """Seconds of this process where it renders on a processor, of the wall clock elsewhere.
+
+    Other programs on the processor so do not count.  Its threads all count: renders keep them busy,
+    precomputation one.
+    """
     return time.process_time() if device.is_cpu else time.perf_counter()
 
 
@@ -86,8 +89,10 @@ class Relative(Interval):
 
 
 def blind(one: Candidate, other: Candidate) -> bool:
-    """Whether all rounds of `one` are the same picture, to which the other's samples only ever add light: it
-    saw nothing of what the other sees."""
+    """Whether `one` saw nothing of what the other sees.
+
+    All its rounds then are the same picture, to which the other's samples only ever add light.
+    """
     if one.variance.any():
         return False
     added = np.asarray(other.images, np.float64) - one.images[0]
@@ -150,7 +155,7 @@ def relative_efficiency(one: Candidate, other: Candidate, resamples: int = 400) 
 
 
 def _quotient(a: float, b: float) -> float:
-    """a / b, at most `MOST` and at least its inverse; 1 where both are 0: black pictures are all alike."""
+    """The quotient a / b, at most `MOST` and at least its inverse; 1 of zeros: black pictures are alike."""
     return 1.0 if a == b else min(max(a / b, 1 / MOST), MOST) if b > 0 else MOST
 
 
@@ -174,8 +179,10 @@ def doubtful(one: Candidate, auto: Candidate, measured: Sequence[Candidate]) -> 
 
 
 def halve(candidates: list[Candidate], auto: Candidate, measured: Sequence[Candidate]) -> list[Candidate]:
-    """The better half, rounded up, best first; of two, one.  Better are the more efficient by what all the
-    measured ones show, and those that are not doubtful."""
+    """The better half, rounded up, best first; of two, one.
+
+    Better are the more efficient by what all the measured ones show, and those that are not doubtful.
+    """
     cost = {
         id(c): (
             doubtful(c, auto, measured),

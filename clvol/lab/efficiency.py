@@ -175,8 +175,10 @@ def pair_error(pairs: np.ndarray) -> tuple[float, float]:
 
 
 def slopes(curves: np.ndarray) -> np.ndarray:
-    """Least-squares slope of log(MSE) over log(rounds) of each row, rounds spread evenly on that axis; -inf
-    where an MSE comes out as 0 or less."""
+    """Least-squares slope of log(MSE) over log(rounds) of each row.
+
+    Rounds are spread evenly on that axis; the slope is -inf where an MSE comes out as 0 or less.
+    """
     places = np.unique(np.geomspace(1, curves.shape[1], 12).round().astype(int))
     values = curves[:, places - 1]
     away = np.log(places) - np.log(places).mean()

@@ -139,8 +139,9 @@ class Judgement:
 
 
 def judge(tested: list[Tested], alpha: float) -> Judgement:
-    """Test each choice and each combination against the others, and strike out the worst until all that are
-    left agree, so that what is wrong does not accuse those it is compared with.
+    """Test each choice and each combination against the others, and strike out the worst until all agree.
+
+    What is wrong so does not accuse those it is compared with.
 
     Each test is of level alpha over the number of those left (Holm); the first of them all accuse a sound
     combination with probability alpha together.
@@ -185,8 +186,10 @@ def _badness(one: Tested | Contrast) -> tuple[float, float]:
 
 
 def _splits(left: list[Tested]) -> list[tuple[Side, Side]]:
-    """Each division of those left into users of a choice and others, once, the smaller side first; not where
-    that is one combination, which has its own test."""
+    """Each division of those left into users of a choice and others, once, the smaller side first.
+
+    Not where that is one combination, which has its own test.
+    """
     choices: dict[frozenset[int], list[str]] = {}
     for family, name in dict.fromkeys(item for one in left for item in one.names.items()):
         users = frozenset(n for n, one in enumerate(left) if one.names[family] == name)
@@ -209,8 +212,10 @@ def _against(one: Tested, everyone: list[Tested], level: float) -> Agreement:
 
 
 def _contrast(users: tuple[Tested, ...], others: tuple[Tested, ...], level: float) -> Agreement:
-    """Test two sides, each pooled, but for combinations much noisier than most, which would drown the rest,
-    and those that may be noisier than they look; they count where a side has no other."""
+    """Test two sides, each pooled but for combinations that are, or may be, much noisier than most.
+
+    These would drown the rest; they count where a side has no other.
+    """
     everyone = (*users, *others)
     bound = NOISY * float(np.median([one.noise for one in everyone]))
     light = max(float(one.images.sum(dtype=np.float64)) for one in everyone) / others[0].images.shape[-1]

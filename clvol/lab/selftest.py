@@ -1,5 +1,7 @@
-"""Whether every way to render a scene makes the same picture of it: on the user's own scene, each combination
-of choices against all the others, with a stated rate of false alarms and the smallest bias that would show.
+"""Whether every way to render a scene makes the same picture of it.
+
+On the user's own scene, each combination of choices is tested against all the others, with a stated rate of
+false alarms and the smallest bias that would show.
 
 The film is small and every combination renders as many samples, in rounds by turns, each of its own seed.
 Combinations are the covering set of `clvol.lab.combinations`: each choice is tested, not each product.
@@ -45,8 +47,10 @@ _TRIAL_SPP = 4
 
 @dataclass(frozen=True)
 class Effort:
-    """How much a self-test does: pixels of the film, seconds of rendering, and the combinations beyond which
-    no more pairs of choices are sought (None: every single choice is enough)."""
+    """How much a self-test does: pixels of the film, seconds of rendering, and a number of combinations.
+
+    Beyond that number no more pairs of choices are sought (None: every single choice is enough).
+    """
 
     pixels: int
     seconds: float
@@ -60,17 +64,28 @@ Step = Callable[[str, int, int], None]
 
 @dataclass(eq=False)
 class SelfTest:
-    """What a self-test found.
+    """What a self-test found; `passed` and `verdict` say it in short.
 
-    Parameters
+    Attributes
     ----------
-    tested : the combinations.  alpha : probability that any of a sound scene's combinations is accused.
-    size, spp, rounds : film (width, height), samples per pixel of a round, rounds of each combination.
-    pairs, all_pairs : pairs of choices that occur together in a combination, and that could.
-    left_out : biased choices, which are not tested.
-    seconds : of rendering.  kernel_seconds : of building kernels.
-    interrupted_of : rounds that there were to be, where Ctrl-C ended them early; else 0.
-    judgement : of the choices, as contrasts of those that use one with those that don't.
+    tested
+        The combinations of choices, each with its rounds and what its comparison with the others found.
+    alpha
+        Probability that any of a sound scene's combinations is accused.
+    size
+        Width and height of the film in pixels.
+    spp, rounds
+        Samples per pixel of a round, and rounds of each combination.
+    pairs, all_pairs
+        Pairs of choices that occur together in a combination, and those that could.
+    left_out
+        Biased choices, which are not tested.
+    seconds, kernel_seconds
+        Of rendering, and of building kernels.
+    interrupted_of
+        Rounds that there were to be, where Ctrl-C ended them early; else 0.
+    judgement
+        Of the choices: those that use one against those that do not.
     """
 
     tested: list[Tested]
@@ -103,8 +118,10 @@ class SelfTest:
 
     @property
     def biases(self) -> np.ndarray:
-        """Relative bias of each combination's and each choice's image mean that would have been seen, but for
-        doubtful ones; empty where there was nothing to compare."""
+        """Relative bias of each combination's and each choice's image mean that would have been seen.
+
+        Without doubtful ones; empty where there was nothing to compare.
+        """
         own = [t.agreement.smallest_bias for t in self.tested if t.agreement and not t.doubtful]
         return np.array([*own, *self.judgement.limits])
 

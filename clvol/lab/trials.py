@@ -1,5 +1,6 @@
-"""Combinations of choices, each opened once and rendered again and again: what comparisons, self-tests and
-pilots measure with.
+"""Combinations of choices, each opened once and rendered again and again.
+
+Comparisons, self-tests and pilots measure with them.
 
 Rounds of different seeds are independent.  Seconds are those of the render alone; what came before it, once,
 is kept apart: precomputation (volumes, majorants, trees), which counts, and kernel builds, which do not.
@@ -66,8 +67,10 @@ class Trial:
 
 
 def rounds(trials: list[Trial], spp: list[int], seeds: Iterator[int]) -> Iterator[list[Result]]:
-    """Rounds in which every trial renders once, each with a seed of its own; the order turns from round to
-    round, so that no trial always begins."""
+    """Rounds in which every trial renders once, each with a seed of its own.
+
+    The order turns from round to round, so that no trial always begins.
+    """
     turn = 0
     while True:
         results: list[Result | None] = [None] * len(trials)

@@ -78,7 +78,8 @@ class Replicates:
     @property
     def sum_(self) -> np.ndarray:
         """Over all samples, float64 (…)."""
-        return self.sums.sum(axis=0)
+        total: np.ndarray = self.sums.sum(axis=0)
+        return total
 
     @property
     def dof(self) -> int:
@@ -112,8 +113,10 @@ class Replicates:
         shares = self.counts / self.count
         if shares.max() < 0.5:
             weights = shares**2 / (1 - 2 * shares)
-            return weights / (1 + weights.sum())
-        return shares / self.dof
+            weights /= 1 + weights.sum()
+        else:
+            weights = shares / self.dof
+        return weights
 
     def plus(self, other: Replicates) -> Replicates:
         """Of further samples of the same randomisations."""

@@ -59,7 +59,8 @@ def tone_map(image: np.ndarray, exposure: float = 0.0) -> np.ndarray:
     linear = np.minimum(linear, SHOULDER) + (1.0 - SHOULDER) * (above / (1.0 + above))
     low = 12.92 * linear
     high = 1.055 * np.power(np.maximum(linear, 0.0031308), 1 / 2.4) - 0.055
-    return np.where(linear <= 0.0031308, low, high).astype(np.float32)
+    encoded: np.ndarray = np.where(linear <= 0.0031308, low, high)
+    return encoded.astype(np.float32)
 
 
 def check_exposure(exposure: float) -> None:
@@ -120,6 +121,8 @@ def _encode(kind: str, pixels: np.ndarray, channels: list[str], attributes: Mapp
     with open(os.memfd_create("picture"), "rb") as memory:
         path = f"/proc/self/fd/{memory.fileno()}"
         output = oiio.ImageOutput.create(kind)
+        if output is None:
+            raise OptionError(f"this OpenImageIO cannot make {kind} files", hint=oiio.geterror())
         written = output.open(path, spec) and output.write_image(np.ascontiguousarray(pixels))
         closed = output.close()
         reason = output.geterror()

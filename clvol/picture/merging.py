@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import reduce
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from clvol.errors import OptionError, shown
 from clvol.picture.result import Ranges, Result, said_ranges
+
+if TYPE_CHECKING:
+    from clvol.picture.estimate import Estimate
 
 _PER_RUN = frozenset(
     {"spp", "samples", "seconds", "device", "time_limit", "interrupted", "pilot", "pilot_reason", "repeat"}
@@ -26,6 +29,16 @@ def merge(results: Iterable[Result]) -> Result:
     Sums and counts add up; AOVs are means weighted by the samples; statistics add, but for maxima and
     sizes (names that begin with "largest", "peak", "bytes", "slots", "pool"), of which the largest stays, and
     for means per path ("energy…"), which are weighted by the paths.
+
+    Parameters
+    ----------
+    results
+        At least one, as `clvol.render` returned them, in any order.
+
+    Returns
+    -------
+    Result
+        The picture of all samples, as if it had been rendered at once.
 
     Raises
     ------
@@ -47,7 +60,8 @@ def merge(results: Iterable[Result]) -> Result:
     results.sort(key=lambda result: result.ranges)
     for other in results[1:]:
         _check_same_render(results[0], other)
-    estimate = reduce(lambda one, other: one.plus(other), [result.estimate for result in results])
+    parts: list[Any] = [result.estimate for result in results]  # of one kind, as the samplers are
+    estimate: Estimate = reduce(lambda one, other: one.plus(other), parts)
     ranges = _joined([span for result in results for span in result.ranges])
     counts = [result.samples[1] for result in results]
     merged = Result.from_estimate(
@@ -99,7 +113,8 @@ def _joined(spans: Sequence[tuple[int, int]]) -> Ranges:
 def _merged_aov(name: str, results: Sequence[Result], counts: Sequence[int]) -> np.ndarray:
     """Mean of one AOV weighted by the number of samples, or its maximum where the name says so; float32."""
     if name.startswith(_LARGEST):
-        return np.max([result.aovs[name] for result in results], axis=0)
+        largest: np.ndarray = np.max([result.aovs[name] for result in results], axis=0)
+        return largest
     total = sum(
         result.aovs[name].astype(np.float64) * count for result, count in zip(results, counts, strict=True)
     )

@@ -99,6 +99,11 @@ def load_file(path: str | Path, **defaults: object) -> Scene:
     **defaults
         Values that replace those of `<default name= value=>`.
 
+    Returns
+    -------
+    Scene
+        What `clvol.render` takes.
+
     Raises
     ------
     SceneError
@@ -114,8 +119,16 @@ def load_file(path: str | Path, **defaults: object) -> Scene:
 def load_dict(scene: Mapping[str, object]) -> Scene:
     """Make a scene from nested dicts, as `mi.load_dict` takes them.
 
-    Arrays serve as grids and bitmaps, 4x4 arrays and objects with a 4x4 ``.matrix`` as transforms.  File
-    names are relative to the working directory.
+    Parameters
+    ----------
+    scene
+        The scene, with ``"type": "scene"``. Arrays serve as grids and bitmaps, 4x4 arrays and objects with
+        a 4x4 ``.matrix`` as transforms. File names are relative to the working directory.
+
+    Returns
+    -------
+    Scene
+        What `clvol.render` takes.
 
     Raises
     ------

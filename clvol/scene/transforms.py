@@ -20,21 +20,68 @@ SMALLEST, LARGEST = 1e-18, 1e18
 
 
 def translate(v: ArrayLike) -> np.ndarray:
-    """Translation by `v` (3 numbers, or one for all axes)."""
+    """Translation.
+
+    Parameters
+    ----------
+    v
+        World units along x, y and z; or one number for all axes.
+
+    Returns
+    -------
+    numpy.ndarray
+        float64 (4, 4).
+
+    Raises
+    ------
+    SceneError
+        Not three finite numbers.
+    """
     matrix = np.eye(4)
     matrix[:3, 3] = _vector(v, "translate")
     return matrix
 
 
 def scale(v: ArrayLike) -> np.ndarray:
-    """Scaling by `v` (3 factors, or one for all axes)."""
+    """Scaling about the origin.
+
+    Parameters
+    ----------
+    v
+        Factors along x, y and z; or one for all axes.
+
+    Returns
+    -------
+    numpy.ndarray
+        float64 (4, 4).
+
+    Raises
+    ------
+    SceneError
+        Not three finite numbers.
+    """
     return np.diag([*_vector(v, "scale"), 1.0])
 
 
 def rotate(axis: ArrayLike, angle_degrees: float) -> np.ndarray:
-    """Rotation about `axis` through the origin, counter-clockwise for an eye the axis points at.
+    """Rotation about an axis through the origin, counter-clockwise for an eye the axis points at.
 
-    The axis may have any length but zero (Mitsuba does not normalise it, and then does not rotate).
+    Parameters
+    ----------
+    axis
+        Three numbers, of any length but zero (Mitsuba does not normalise it, and then does not rotate).
+    angle_degrees
+        Angle in degrees.
+
+    Returns
+    -------
+    numpy.ndarray
+        float64 (4, 4).
+
+    Raises
+    ------
+    SceneError
+        An axis of length zero, or what is no finite number.
     """
     direction = _vector(axis, "rotate: axis")
     length = np.linalg.norm(direction)
@@ -53,6 +100,18 @@ def look_at(origin: ArrayLike, target: ArrayLike, up: ArrayLike) -> np.ndarray:
     """Camera-to-world matrix at `origin` with local +z towards `target` and local +y near `up`.
 
     The columns are left (up x dir), up, dir, origin, as in Mitsuba: local +x is the image's left.
+
+    Parameters
+    ----------
+    origin, target
+        World positions, three numbers each.
+    up
+        A direction in the world, of any length but zero.
+
+    Returns
+    -------
+    numpy.ndarray
+        float64 (4, 4).
 
     Raises
     ------

@@ -81,6 +81,7 @@ def test_wheel_holds_every_kernel_file_and_every_module(wheel: Path) -> None:
     assert len(expected) > 50
     found = {name for name in zipfile.ZipFile(wheel).namelist() if name.startswith("clvol/")}
     assert found == expected
+    assert "clvol/py.typed" in found, "type checkers ignore clvol's annotations without it"
 
 
 def test_wheel_says_its_licence_and_holds_its_text(wheel: Path) -> None:

@@ -7,15 +7,22 @@ Names are imported when first used, so that the command line stays quick.
 """
 
 from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from clvol.lab.comparison.comparing import compare
+    from clvol.lab.comparison.result import Comparison
+
+__all__ = ["Comparison", "compare"]
 
 _EXPORTS = {"Comparison": "clvol.lab.comparison.result", "compare": "clvol.lab.comparison.comparing"}
 
-__all__ = list(_EXPORTS)
+if not TYPE_CHECKING:
 
-
-def __getattr__(name: str) -> object:
-    if name not in _EXPORTS:
-        raise AttributeError(f"module 'clvol.lab.comparison' has no attribute {name!r}")
-    value = getattr(import_module(_EXPORTS[name]), name)
-    globals()[name] = value
-    return value
+    def __getattr__(name: str) -> object:
+        """Import a public name when it is first used."""
+        if name not in _EXPORTS:
+            raise AttributeError(f"module 'clvol.lab.comparison' has no attribute {name!r}")
+        value = getattr(import_module(_EXPORTS[name]), name)
+        globals()[name] = value
+        return value

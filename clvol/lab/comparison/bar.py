@@ -12,8 +12,10 @@ if TYPE_CHECKING:
 
 
 class Bar:
-    """Progress on standard error, time left included; silent where that is no terminal.  A context manager
-    that is called with seconds done, seconds expected and what is being done."""
+    """Progress on standard error, time left included; silent where that is no terminal.
+
+    A context manager that is called with seconds done, seconds expected and what is being done.
+    """
 
     def __init__(self, console: Console | None = None) -> None:
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn

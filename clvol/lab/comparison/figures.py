@@ -33,8 +33,11 @@ COSTS = {"seconds": "time", "lookups": "look-ups"}
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """An error over the rounds: float64 (rounds,) each; the MSE of the mean of 1, 2, … rounds, over every
-    order of the rounds, and the ends of its 95 % bootstrap band, which may be negative."""
+    """An error over the rounds, float64 (rounds,) each.
+
+    The MSE of the mean of 1, 2, … rounds, over every order of the rounds, and the ends of its 95 % bootstrap
+    band, which may be negative.
+    """
 
     value: np.ndarray
     low: np.ndarray
@@ -43,8 +46,9 @@ class Curve:
 
 @dataclass(frozen=True)
 class Efficiency:
-    """1 / (MSE · cost) of the mean of all rounds, precomputation counted where cost is seconds.  It holds for
-    renders of as many samples as a round: those of sampler sobol gain with their number.
+    """1 / (MSE · cost) of the mean of all rounds, precomputation counted where cost is seconds.
+
+    It holds for renders of as many samples as a round: those of sampler sobol gain with their number.
 
     Parameters
     ----------
@@ -63,8 +67,10 @@ class Efficiency:
 
 @dataclass(frozen=True)
 class LargestError:
-    """The pixel of the mean of all rounds that is furthest from the reference: its place, its difference, and
-    that in standard errors of the reference and the rounds."""
+    """The pixel of the mean of all rounds that is furthest from the reference.
+
+    Its place, its difference, and that in standard errors of the reference and the rounds.
+    """
 
     x: int
     y: int
@@ -77,17 +83,29 @@ class LargestError:
 class Figures:
     """What was found of one combination.
 
-    Parameters
+    Attributes
     ----------
-    mse, relmse : Curve of the absolute and of the relative error.
-    seconds, lookups : float64 (rounds,): spent for the mean of 1, 2, … rounds, precomputation counted.
-    slope : of the MSE of means of separate renders over their number, with its band; -1 without bias.
-    render_slope : of the MSE of one render over its samples, with its 95 % interval; -1 for independent
-        samples without bias, nan where there are too few.
-    squared_bias, relative_squared_bias : estimates, which may be negative by chance.
-    efficiency : Efficiency by kind of cost, "seconds" and, where the density is looked up at all, "lookups".
-    worst_round : share of the squared error that one round has.
-    verdict : tests against the reference, tile by tile and of the mean.
+    measured
+        Its rounds, as they were rendered.
+    mse, relmse
+        The absolute and the relative error over the rounds.
+    seconds, lookups
+        float64 (rounds,): spent for the mean of 1, 2, … rounds, precomputation counted.
+    slope
+        Of the MSE of means of separate renders over their number, with its band; -1 without bias.
+    render_slope
+        Of the MSE of one render over its samples, with its 95 % interval; -1 for independent samples without
+        bias, nan where there are too few.
+    squared_bias, relative_squared_bias
+        Estimates, which may be negative by chance.
+    efficiency
+        By kind of cost: "seconds" and, where the density is looked up at all, "lookups".
+    worst_round
+        Share of the squared error that one round has.
+    largest_error
+        Where the mean of all rounds is furthest from the reference.
+    verdict
+        Tests against the reference, tile by tile and of the mean.
     """
 
     measured: Measured

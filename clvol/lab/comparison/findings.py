@@ -11,15 +11,24 @@ from clvol.lab.comparison.reference import Reference
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """Combinations compared on one scene.
+    """Combinations compared on one scene; ``found["delta"]`` are the figures of the one with that label.
 
-    Parameters
+    Attributes
     ----------
-    figures : of each combination, in the order asked for.
-    baseline : label of the one that efficiencies are relative to.
-    left_out : (asked for, why it cannot be); doubles : (asked for, label that it comes to).
-    interrupted : whether Ctrl-C ended it early.
-    about : how it was made.
+    figures
+        Of each combination, in the order asked for.
+    baseline
+        Label of the one that efficiencies are relative to.
+    reference
+        The picture that all are compared with, and how it was made.
+    left_out
+        Pairs of what was asked for, and why it cannot be.
+    doubles
+        Pairs of what was asked for, and the label of the combination that it comes to.
+    interrupted
+        Whether Ctrl-C ended it early.
+    about
+        How it was made.
     """
 
     figures: tuple[Figures, ...]

@@ -1,5 +1,7 @@
-"""Rendering by turns: a short trial sets the samples of a round, then rounds of every combination and of the
-reference, each render with a seed of its own."""
+"""Rendering by turns: rounds of every combination and of the reference.
+
+A short trial sets the samples of a round; each render has a seed of its own.
+"""
 
 from __future__ import annotations
 
@@ -203,8 +205,10 @@ def _rounds(running: list[_Entrant], count: int, seeds: Iterator[int]) -> tuple[
 
 
 def _samples(wanted: float, lineup: Lineup) -> int:
-    """Samples of a render, at least 1.  Where sampler sobol takes part, a power of two from 4 on for all:
-    others cost it some of its gain."""
+    """Samples of a render, at least 1.
+
+    Where sampler sobol takes part, a power of two from 4 on for all: others cost it some of its gain.
+    """
     if any(uses_sobol(trial) for trial in lineup.trials.values()):
         below = 2 ** max(2, math.floor(math.log2(max(wanted, 1.0))))
         return below if wanted < 1.5 * below else 2 * below

@@ -159,8 +159,10 @@ def picture(image: np.ndarray) -> bytes:
 
 
 def error_scales(findings: Findings) -> tuple[float, float]:
-    """What the error images of all combinations end at: of a round's relative RMS error, and of the relative
-    difference of the mean."""
+    """What the error images of all combinations end at.
+
+    The first is of a round's relative RMS error, the second of the relative difference of the mean.
+    """
     spreads = [np.quantile(_spread(f, findings), 0.99) for f in findings.figures]
     differences = [np.quantile(np.abs(_difference(f, findings)), 0.99) for f in findings.figures]
     return max(float(max(spreads)), 1e-12), max(float(max(differences)), 1e-12)

@@ -158,9 +158,11 @@ def _warn_of_doubts(where: str, metadata: dict[str, object], known: bool, scene:
 
 
 def _stand_ins(image: np.ndarray, variance: np.ndarray, dof: int) -> np.ndarray:
-    """Rounds that have exactly this mean and this variance of the mean, with as many degrees of freedom: what
-    a test between stacks takes when the rounds themselves are gone.  Channels share their noise, as they do
-    where paths carry them together: no certainty comes of taking their mean."""
+    """Rounds that have exactly this mean and this variance of the mean, with as many degrees of freedom.
+
+    A test between stacks takes them when the rounds themselves are gone.  Channels share their noise, as they
+    do where paths carry them together: no certainty comes of taking their mean.
+    """
     count = dof + 1
     noise = np.random.default_rng(1).standard_normal((count, *image.shape[:2], 1))
     noise -= noise.mean(axis=0)

@@ -63,8 +63,9 @@ class _Part(NamedTuple):
 
 
 def find_places(kernels: RayKernels, x: int, y: int) -> list[Place]:
-    """The media on the ray through the centre of pixel (x, y), in the order of entry, up to a surface that no
-    light passes.
+    """The media on the ray through the centre of pixel (x, y), in the order of entry.
+
+    They end at a surface that no light passes.
 
     Raises
     ------

@@ -18,12 +18,20 @@ DARK = 1e-3
 class WatchedRay:
     """One camera ray through its first medium, and what walks did along it.
 
-    scene, pixel, medium, seed, device : what was looked at, and with which numbers.
-    place : where the ray enters the medium, and how long it stays; world lengths.
-    channel : number of the channel that is shown, of ``len(sigma_t)``.
-    sigma_t : float64 (channels, n), at the middles of n even steps.
-    watched : each technique and transmittance, in the order asked for.
-    notes : what a viewer has to know.
+    Attributes
+    ----------
+    scene, pixel, medium, seed, device
+        What was looked at, and with which random numbers.
+    place
+        Where the ray enters the medium, and how long it stays, in world lengths.
+    channel
+        Number of the channel that is shown, of ``len(sigma_t)``.
+    sigma_t
+        float64 (channels, n), per world length, at the middles of n even steps.
+    watched
+        Each technique and transmittance, in the order asked for.
+    notes
+        What a viewer has to know, in sentences.
     """
 
     scene: str
@@ -44,8 +52,10 @@ class WatchedRay:
 
     @property
     def window(self) -> tuple[float, float]:
-        """The part worth a look, from the medium's entry: from its first matter to where walks have
-        ended and little light is left."""
+        """The part worth a look, from the medium's entry.
+
+        From its first matter to where walks have ended and little light is left.
+        """
         matter = np.flatnonzero(self.sigma_t.any(axis=0))
         first, last = self.edges[matter[0]], self.edges[matter[-1] + 1]
         for watched in self.watched:
