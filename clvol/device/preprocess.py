@@ -107,7 +107,7 @@ class Preprocessor:
             return line
         value = True if word == "else" else self._value(operand)
         if this.over or value is not None:
-            this.active = not this.over and value
+            this.active = not this.over and value is True
             this.over |= this.active
             return None
         this.decided, this.active = False, True
