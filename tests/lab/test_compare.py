@@ -26,7 +26,8 @@ from clvol.lab.comparison.reference import Reference, read_reference
 from clvol.lab.comparison.report import as_json, check_folder, write_report
 from clvol.lab.comparison.result import Comparison
 from clvol.lab.comparison.shorter import render_slope, shorter_spp
-from clvol.lab.comparison.words import _slope, text_table
+from clvol.lab.comparison.table import text_table
+from clvol.lab.comparison.words import _slope
 from clvol.lab.names import names_asked, plural
 from clvol.lab.seeds import seeds_from
 from clvol.lab.statistics import Interval

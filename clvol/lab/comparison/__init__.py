@@ -1,7 +1,7 @@
 """Speed against error on a user's own scene: combinations of choices, measured by turns, and the report.
 
 combine.py says what is compared, measure.py renders it, figures.py makes numbers of it and
-findings.py holds them; words.py makes sentences of these, plots.py pictures, report.py a folder, and
+findings.py holds them; words.py and table.py say it, plots.py draws it, report.py writes the folder, and
 result.py is what a user has in hand.  The statistics are in `clvol.lab.efficiency` and `clvol.lab.agreement`.
 Names are imported when first used, so that the command line stays quick.
 """

@@ -6,7 +6,8 @@ import os
 
 from clvol.lab.comparison.findings import Findings
 from clvol.lab.comparison.report import write_report
-from clvol.lab.comparison.words import sentences, text_table
+from clvol.lab.comparison.table import text_table
+from clvol.lab.comparison.words import sentences
 
 
 class Comparison(Findings):
