@@ -24,11 +24,12 @@ import click
 from bench_cloud import mitsuba_here
 from bench_tables import Figures, Row, Unavailable, judge, save
 from documents import writable
+from folders import SCENES
 from scene_options import choice_options, open_scene
 
 from clvol.cli.messages import OneLineErrors
 
-CLOUD = str(Path(__file__).resolve().parent.parent / "scenes" / "cloud.xml")
+CLOUD = str(SCENES / "cloud.xml")
 POOL_SIZES = (2048, 8192, 32768)
 Outcome = tuple[Path | None, Figures]
 """What a command returns: the file to write its figures to, and the figures."""

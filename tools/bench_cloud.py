@@ -10,10 +10,8 @@ import numpy as np
 from bench_tables import Figures, Row, Unavailable, at_least, ranged, show, thread_count
 from efficiency import Rounds, efficiencies, efficiency_ratio, image_mean, pixel_variance, spread, z_score
 from mitsuba_side import REQUIREMENT, MitsubaSide, mitsuba_python
-from scene_options import OpenScene, open_scene
+from scene_options import open_scene
 
-from clvol.picture.result import Result
-from clvol.rendering.outcome import make_result
 from clvol.version import __version__
 
 EFFICIENCY_TARGET = 8.0
@@ -41,15 +39,6 @@ def has_mitsuba(python: str) -> bool:
         return False
 
 
-def timed_render(opened: OpenScene, spp: int, seed: int) -> tuple[Result, float, float]:
-    """Result, CPU seconds and wall seconds of a render, kernels built and loaded before."""
-    session = opened.session(seed)
-    wall, cpu = time.perf_counter(), time.process_time()
-    done = session.run(0, spp)
-    result = make_result(session, 0, done)
-    return result, time.process_time() - cpu, time.perf_counter() - wall
-
-
 def samples_for(seconds: float, trial_spp: int, trial_seconds: float) -> int:
     """Samples per pixel that take about `seconds`."""
     return max(2, round(trial_spp * seconds / trial_seconds))
@@ -68,23 +57,19 @@ def measure_cloud(
     cpu = time.process_time()
     opened = open_scene(scene, {"res": res}, choices, device)
     setup_cpu = time.process_time() - cpu
-    timed_render(opened, 1, 0)  # the first launch finishes the kernels' build
-    spp = samples_for(seconds, 16, timed_render(opened, 16, 0)[2])
-    ours: list[tuple[np.ndarray, float]] = []
-    theirs: list[tuple[np.ndarray, float]] = []
+    opened.render(1, 0)  # the first launch finishes the kernels' build
+    spp = samples_for(seconds, 16, opened.render(16, 0).wall)
+    ours, theirs = [], []
     own_variance = []
     with MitsubaSide(python, scene, {"res": str(res)}, thread_count()) as mitsuba:
         mitsuba.render(1, 0)
         mitsuba_spp = samples_for(seconds, 4, mitsuba.render(4, 0)[2])
         for seed in range(1, rounds + 1):
-            result, cpu, _ = timed_render(opened, spp, seed)
+            result, cpu, _ = opened.render(spp, seed)
             ours.append((result.image, cpu))
             own_variance.append(float(result.variance.mean(dtype=np.float64)) * spp)
             theirs.append(mitsuba.render(mitsuba_spp, seed)[:2])
-    sides = {
-        "clvol": Rounds(np.stack([i for i, _ in ours]), np.array([c for _, c in ours]), spp),
-        "mitsuba": Rounds(np.stack([i for i, _ in theirs]), np.array([c for _, c in theirs]), mitsuba_spp),
-    }
+    sides = {"clvol": Rounds.of(ours, spp), "mitsuba": Rounds.of(theirs, mitsuba_spp)}
     figures: Figures = {name: _side_figures(side) for name, side in sides.items()}
     figures["clvol"] |= {"version": __version__, "setup_cpu": setup_cpu}
     figures["clvol"]["variance_by_pixel"] = float(np.mean(own_variance))

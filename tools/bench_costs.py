@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import Any
 
 import big_grids
+import click
 from bench_tables import Figures, Row, at_most, ranged, show
 from efficiency import spread
+from folders import SCENES
 
 import clvol
 from clvol.tables.prepare import prepare
 
-SCENES = Path(__file__).resolve().parent.parent / "scenes"
 COLD_TARGET, WARM_TARGET, LOAD_TARGET = 15.0, 3.0, 3.0
 MEMORY_TARGET = 3.0
 
@@ -186,5 +187,12 @@ def memory_rows(figures: Figures) -> list[Row]:
     return [at_most(text, f"{cloud:.1f} (a cloud) to {noise:.1f} (noise)", MEMORY_TARGET, "", cloud, noise)]
 
 
+@click.command()
+@click.argument("grid", type=click.Path(path_type=Path))
+def main(grid: Path) -> None:
+    """Print the peak memory in bytes of a process that renders GRID, a .npy file: this one."""
+    click.echo(render_grid(grid))
+
+
 if __name__ == "__main__":
-    print(render_grid(Path(sys.argv[1])))
+    main()

@@ -8,18 +8,14 @@ from bench_tables import Figures, ranged, show
 from efficiency import spread
 from scene_options import OpenScene
 
-from clvol.rendering.outcome import make_result
-
 
 def measure_pool(opened: OpenScene, sizes: list[int], spp: int, rounds: int) -> Figures:
     """Seconds per stage for each pool size, by turns."""
     runs: dict[int, list[dict[str, Any]]] = {size: [] for size in sizes}
-    opened.session(0).run(0, 1)
+    opened.render(1, 0)
     for _ in range(rounds):
         for size in sizes:
-            session = opened.session(0, size)
-            done = session.run(0, spp)
-            runs[size].append(make_result(session, 0, done).stats)
+            runs[size].append(opened.render(spp, 0, size).result.stats)
     figures: Figures = {}
     for size, stats in runs.items():
         stages = {

@@ -21,6 +21,7 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -28,6 +29,7 @@ import pyopencl as cl
 from bench_costs import peak_bytes
 from bench_tables import Figures, Row, Unavailable, at_least, judge, ranged, show
 from efficiency import spread
+from folders import cached
 
 from clvol.accel.bvh import Bvh, build_bvh
 from clvol.device import programs
@@ -187,8 +189,7 @@ def embree_environment() -> dict[str, str]:
     """Variables with which Python finds embreex: its own, else that of a cached folder, filled when empty."""
     if importlib.util.find_spec("embreex"):
         return {}
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = cache / "clvol" / "embreex"
+    folder = cached("embreex")
     if not (folder / "embreex").exists():
         click.echo(f"installing {REQUIREMENT} in {folder}", err=True)
         pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", str(folder)]
@@ -262,11 +263,21 @@ def ray_rows(figures: Figures) -> list[Row]:
     return rows
 
 
-if __name__ == "__main__":
-    if len(sys.argv) == 1:
+@click.command()
+@click.argument("part", type=click.Choice(["build", "rates"]), required=False)
+@click.argument("arguments", default="[]", type=json.loads, metavar="[ARGUMENTS]")
+def main(part: str | None, arguments: list[Any]) -> None:
+    """Measure rays beside Embree, and print figures and aims; exit 1 if one is missed.
+
+    With a PART and its ARGUMENTS, a JSON list: only that, in this process, and its figures as JSON.
+    """
+    if part is None:
         figures = measure_rays(5)
         show_rays(figures)
         sys.exit(judge(ray_rows(figures)))
-    else:
-        measure = {"build": build_costs, "rates": rates}[sys.argv[1]]
-        print(json.dumps(measure(*json.loads(sys.argv[2]))))
+    measure = {"build": build_costs, "rates": rates}[part]
+    click.echo(json.dumps(measure(*arguments)))
+
+
+if __name__ == "__main__":
+    main()

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from bench_cloud import Z_LIMIT, agrees, measure_cloud, show_cloud
 from bench_tables import Figures, Row, at_least, ranged, show
+from folders import SCENES
 from scene_options import open_scene
 
-from clvol.rendering.outcome import make_result
-
-ROOM = str(Path(__file__).resolve().parent.parent / "scenes" / "room.xml")
+ROOM = str(SCENES / "room.xml")
 EFFICIENCY_TARGET = 5.0
 
 
 def stage_seconds(scene: str, res: int, choices: dict[str, str], device: str | None) -> Figures:
     """Device seconds of each stage in one render, kernels built and loaded before."""
     opened = open_scene(scene, {"res": res}, choices, device)
-    opened.session(0).run(0, 1)
-    session = opened.session(1)
-    done = session.run(0, 16)
-    stats = make_result(session, 0, done).stats["seconds"]
-    return {stage: stats[stage] for stage in opened.config().stages}
+    opened.render(1, 0)
+    seconds = opened.render(16, 1).result.stats["seconds"]
+    return {stage: seconds[stage] for stage in opened.config().stages}
 
 
 def measure_room(

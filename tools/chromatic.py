@@ -8,23 +8,21 @@ The bars: delta tracking of all events, absorption too ("sample"), and what `aut
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
-from pathlib import Path
 
 import click
 import numpy as np
 from bench_tables import Figures, Row, ranged, thread_count
 from efficiency import Rounds, efficiency_ratio, image_mean, pixel_variance, z_score
+from folders import SCENES
+from scene_options import OpenScene
 
+from clvol.cli.options import device_option
 from clvol.device.device import open_device
-from clvol.planning.choices import Choices, prepare_for
-from clvol.rendering.outcome import make_result
-from clvol.rendering.session import Session
+from clvol.planning.choices import Choices
 from clvol.scene import load_file
 from clvol.scene.records import ConstVolume, Scene
 
-CLOUD = Path(__file__).resolve().parent.parent / "scenes" / "cloud.xml"
 SIGMA_T, ALBEDO = (60.0, 30.0, 10.0), (0.95, 0.9, 0.8)
 BARS = ("sample", "mixed")
 FIREFLY = 30.0
@@ -33,43 +31,42 @@ FIREFLY = 30.0
 
 def cloud(scale: tuple[float, ...], albedo: tuple[float, ...], res: int) -> Scene:
     """scenes/cloud.xml with other coefficients, without a limit of depth."""
-    scene = load_file(CLOUD, res=res)
+    scene = load_file(SCENES / "cloud.xml", res=res)
     shape = scene.shapes[0]
     medium = replace(shape.interior, scale=scale, albedo=ConstVolume(albedo))
     integrator = replace(scene.integrator, max_depth=-1)
     return replace(scene, shapes=(replace(shape, interior=medium),), integrator=integrator)
 
 
-def timed(device, scene: Scene, choices: Choices, spp: int, seed: int):
-    """Result and CPU seconds of a render, kernels built before."""
-    session = Session.open(device, prepare_for(scene, choices), choices, seed)
-    started = time.process_time()
-    done = session.run(0, spp)
-    cpu = time.process_time() - started
-    return make_result(session, 0, done), cpu
-
-
 def measure_chromatic(res: int, spp: int, rounds: int, technique: str, device: str | None) -> Figures:
     """Render by turns; both sides' cost, their means and the ratios of efficiency; the brightest sample."""
     opened = open_device(device)
+
+    def ready(choices: Choices, scale: tuple[float, ...], albedo: tuple[float, ...]) -> OpenScene:
+        return OpenScene.of(opened, cloud(scale, albedo, res), choices)
+
     chosen = Choices(technique=technique)
-    whole = cloud(SIGMA_T, ALBEDO, res)
-    greys = [cloud((s,), (a,), res) for s, a in zip(SIGMA_T, ALBEDO, strict=True)]
-    bars = {name: Choices(technique="delta", absorption=name) for name in BARS}
-    for scene, choices in ((whole, chosen), *((grey, bar) for bar in bars.values() for grey in greys)):
-        timed(opened, scene, choices, 4, 0)
-    sides: dict[str, tuple[list, list]] = {name: ([], []) for name in ("chromatic", *bars)}
+    whole = ready(chosen, SIGMA_T, ALBEDO)
+    bars = {
+        name: [
+            ready(Choices(technique="delta", absorption=name), (s,), (a,))
+            for s, a in zip(SIGMA_T, ALBEDO, strict=True)
+        ]
+        for name in BARS
+    }
+    for scene in (whole, *(grey for greys in bars.values() for grey in greys)):
+        scene.render(4, 0)
+    sides: dict[str, list[tuple[np.ndarray, float]]] = {name: [] for name in ("chromatic", *bars)}
     for seed in range(1, rounds + 1):
-        result, cpu = timed(opened, whole, chosen, spp, seed)
-        sides["chromatic"][0].append(result.image)
-        sides["chromatic"][1].append(cpu)
-        for name, bar in bars.items():
-            parts = [timed(opened, grey, bar, spp, seed + 1000 * c) for c, grey in enumerate(greys, 1)]
-            sides[name][0].append(np.stack([r.image[..., 0] for r, _ in parts], axis=-1))
-            sides[name][1].append(sum(cpu for _, cpu in parts))
-    found = {name: Rounds(np.stack(images), np.array(cpu), spp) for name, (images, cpu) in sides.items()}
+        result, cpu, _ = whole.render(spp, seed)
+        sides["chromatic"].append((result.image, cpu))
+        for name, greys in bars.items():
+            parts = [grey.render(spp, seed + 1000 * c) for c, grey in enumerate(greys, 1)]
+            image = np.stack([part.result.image[..., 0] for part in parts], axis=-1)
+            sides[name].append((image, sum(part.cpu for part in parts)))
+    found = {name: Rounds.of(renders, spp) for name, renders in sides.items()}
     channels = [[part(found[name], channel) for name in ("chromatic", "mixed")] for channel in range(3)]
-    white, _ = timed(opened, cloud(SIGMA_T, (0.999,) * 3, res), chosen, 8 * spp, 1)
+    white = ready(chosen, SIGMA_T, (0.999,) * 3).render(8 * spp, 1).result
     return {
         "res": res,
         "rounds": rounds,
@@ -135,7 +132,7 @@ def chromatic_rows(figures: Figures) -> list[Row]:
 @click.option("--spp", default=128, show_default=True)
 @click.option("--rounds", default=6, show_default=True, type=click.IntRange(min=2))
 @click.option("--technique", default="auto", show_default=True, help="The chromatic side's.")
-@click.option("--device", metavar="PATTERN", help="Part of the device's name; see clvol devices.")
+@device_option
 def main(
     res: int, spp: int, rounds: int, technique: str, device: str | None
 ) -> tuple[None, dict[str, Figures]]:

@@ -12,6 +12,7 @@ import bench
 import click
 from bench_tables import Figures as Measured
 from bench_tables import markdown, thread_count
+from folders import ROOT
 from pilot import HEADER, HOPELESS, Tested
 
 import clvol
@@ -20,7 +21,6 @@ from clvol.lab.comparison.figures import Figures
 from clvol.lab.comparison.result import Comparison
 from clvol.planning.registry import TECHNIQUES, TRANSMITTANCES
 
-ROOT = Path(__file__).resolve().parent.parent
 SMALL = {"width": 48, "height": 64}
 SCENES = {
     "Grey cloud": ("scenes/cloud.xml", {"res": 64}, "a procedural cumulus, albedo 0.9, under a white sky"),

@@ -7,6 +7,7 @@ different seeds, so that no renderer has to be believed about its own noise.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +32,12 @@ class Rounds:
     images: np.ndarray
     cpu: np.ndarray
     spp: int
+
+    @classmethod
+    def of(cls, renders: Sequence[tuple[np.ndarray, float]], spp: int) -> Rounds:
+        """Of the image and the CPU seconds of each."""
+        images, cpu = zip(*renders, strict=True)
+        return cls(np.stack(images), np.array(cpu), spp)
 
     @property
     def paths(self) -> int:

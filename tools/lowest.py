@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 
+import click
+from folders import ROOT
 from packaging.requirements import Requirement
 
-PROJECT = Path(__file__).resolve().parent.parent / "pyproject.toml"
+PROJECT = ROOT / "pyproject.toml"
 
 
 def expanded(name: str, extras: dict[str, list[str]], requirements: Iterable[str]) -> Iterator[Requirement]:
@@ -34,6 +35,7 @@ def lowest(requirements: Iterable[Requirement]) -> Iterator[str]:
         yield f"{requirement.name}=={bounds[0]}{marker}"
 
 
+@click.command(help=__doc__)
 def main() -> None:
     project = tomllib.loads(PROJECT.read_text(encoding="utf-8"))["project"]
     wanted = [*project["dependencies"], f"{project['name']}[test]"]

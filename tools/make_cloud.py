@@ -10,16 +10,17 @@ translucent wisps.  Densities are multiples of 1/255, so that the file packs wel
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
+import click
 import numpy as np
+from folders import SCENES
 
 from clvol.volumes import write_vol
 
 SIZE = 128
 SEED = 7
-DEFAULT_PATH = Path(__file__).resolve().parent.parent / "scenes" / "cloud.vol"
+DEFAULT_PATH = SCENES / "cloud.vol"
 
 RADIUS = 0.33  # of the undisturbed sphere, in units of the cube's edge
 EDGE = 0.05  # depth over which density rises from 0 to 1
@@ -92,11 +93,12 @@ def make_cloud(size: int = SIZE) -> np.ndarray:
     return values
 
 
-def main(arguments: list[str]) -> None:
-    """Write the cloud to the path given, or to scenes/cloud.vol."""
-    path = Path(arguments[0]) if arguments else DEFAULT_PATH
+@click.command()
+@click.argument("path", default=DEFAULT_PATH, type=click.Path(path_type=Path), metavar="[PATH]")
+def main(path: Path) -> None:
+    """Write the cloud to PATH, or to scenes/cloud.vol."""
     write_vol(path, make_cloud(), np.array([[0, 0, 0], [1, 1, 1]]))
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -8,15 +8,15 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
+import click
 import numpy as np
+from folders import SCENES
 from make_cloud import fractal
 
 from clvol.volumes import write_vol
 
-SCENES = Path(__file__).resolve().parent.parent / "scenes"
 PLUME_SHAPE = (36, 52, 36)  # z, y, x; y is up
 PLUME_SEED = 3
 KNOT_SIZE = (280, 18)  # rings along the knot, corners of a ring
@@ -82,12 +82,13 @@ def write_ply(path: Path, vertices: np.ndarray, normals: np.ndarray, faces: np.n
     path.write_bytes("\n".join(header).encode() + body)
 
 
-def main(arguments: list[str]) -> None:
-    """Write the files to the folder given, or to scenes/."""
-    folder = Path(arguments[0]) if arguments else SCENES
+@click.command()
+@click.argument("folder", default=SCENES, type=click.Path(path_type=Path), metavar="[FOLDER]")
+def main(folder: Path) -> None:
+    """Write the files to FOLDER, or to scenes/."""
     write_vol(folder / "plume.vol", make_plume(), np.array([[0, 0, 0], [1, 1, 1]]))
     write_ply(folder / "knot.ply", *make_knot())
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

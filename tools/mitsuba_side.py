@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 import tempfile
@@ -12,6 +11,7 @@ from typing import Any
 
 import click
 import numpy as np
+from folders import cached
 
 WORKER = Path(__file__).with_name("mitsuba_worker.py")
 REQUIREMENT = "mitsuba==3.9.*"
@@ -21,8 +21,7 @@ def mitsuba_python(given: str | None) -> str:
     """The Python that has Mitsuba: the one given, else that of a cached environment, made when missing."""
     if given:
         return given
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = cache / "clvol" / "mitsuba-3.9"
+    folder = cached("mitsuba-3.9")
     python, ready = folder / "bin" / "python", folder / "ready"
     if not ready.exists():
         click.echo(f"installing {REQUIREMENT} in {folder}", err=True)

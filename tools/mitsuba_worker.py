@@ -11,21 +11,25 @@ Reads one JSON object a line and answers each with one:
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import sys
 import time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import drjit
-import mitsuba
 import numpy as np
 
-mitsuba.set_variant("scalar_rgb")
+if TYPE_CHECKING:
+    import mitsuba
 
 
 def load(request: dict[str, Any]) -> tuple[mitsuba.Scene, dict[str, Any]]:
     """The scene asked for, and the answer."""
+    import drjit
+    import mitsuba
+
+    mitsuba.set_variant("scalar_rgb")
     drjit.set_thread_count(request["threads"])
     started = time.process_time()
     scene = mitsuba.load_file(request["load"], **request["defaults"])
@@ -34,6 +38,8 @@ def load(request: dict[str, Any]) -> tuple[mitsuba.Scene, dict[str, Any]]:
 
 def render(scene: mitsuba.Scene, request: dict[str, Any]) -> dict[str, Any]:
     """Render, write the image, and answer what the render cost."""
+    import mitsuba
+
     wall, cpu = time.perf_counter(), time.process_time()
     image = np.array(mitsuba.render(scene, spp=request["spp"], seed=request["seed"]))
     answer = {"cpu": time.process_time() - cpu, "wall": time.perf_counter() - wall}
@@ -43,6 +49,8 @@ def render(scene: mitsuba.Scene, request: dict[str, Any]) -> dict[str, Any]:
 
 def main() -> None:
     """Serve requests until the input ends."""
+    form = argparse.RawDescriptionHelpFormatter
+    argparse.ArgumentParser(description=__doc__, formatter_class=form).parse_args()
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "w")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what Mitsuba prints must not mix with the answers
     scene = None

@@ -12,10 +12,10 @@ import itertools
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import click
 import numpy as np
+from folders import SCENES as FOLDER
 from rich.console import Console
 from rich.progress import track
 
@@ -30,7 +30,6 @@ from clvol.lab.seeds import independent_seeds
 from clvol.planning.choices import Choices
 from clvol.scene import load_file
 
-ROOT = Path(__file__).resolve().parent.parent
 SCENES = {
     "cloud": {"res": 96},
     "smoke": {"width": 72, "height": 96},
@@ -104,7 +103,7 @@ def unmet(pilot: Pilot, count: int) -> list[Candidate]:
 
 def tested(name: str, spp: int, rounds: int, more: int, device: str | None) -> Tested:
     """A scene's pilot, then rounds of what it considered and of `more` others."""
-    scene = load_file(str(ROOT / "scenes" / f"{name}.xml"), **SCENES[name])
+    scene = load_file(str(FOLDER / f"{name}.xml"), **SCENES[name])
     pilot = Pilot(open_device(device), scene, Choices(), independent_seeds(0, "pilot"), spp, None, None, True)
     with quiet_renders():
         found = pilot.found()

@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from clvol.cli.options import device_option, family_options
 from clvol.device.device import Device, open_device
+from clvol.picture.result import Result
 from clvol.planning.choices import Choices, prepare_for
 from clvol.planning.config import KernelConfig
 from clvol.planning.registry import FAMILIES
+from clvol.rendering.outcome import make_result
 from clvol.rendering.session import Session, kernel_config
 from clvol.scene import load_file
+from clvol.scene.records import Scene
 from clvol.tables.prepare import PreparedScene
+
+
+class Timed(NamedTuple):
+    """A render, and the CPU and wall seconds that it took."""
+
+    result: Result
+    cpu: float
+    wall: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,9 +36,21 @@ class OpenScene:
     prepared: PreparedScene
     choices: Choices
 
+    @classmethod
+    def of(cls, device: Device, scene: Scene, choices: Choices) -> OpenScene:
+        """Prepare a scene for the choices."""
+        return cls(device, prepare_for(scene, choices), choices)
+
     def config(self) -> KernelConfig:
         """What is compiled for it."""
         return kernel_config(self.prepared, self.choices, self.device)
+
+    def render(self, spp: int, seed: int, pool: int | None = None) -> Timed:
+        """Render the first `spp` samples; the kernels are built, and loaded, before the clocks start."""
+        session = self.session(seed, pool)
+        wall, cpu = time.perf_counter(), time.process_time()
+        result = make_result(session, 0, session.run(0, spp))
+        return Timed(result, time.process_time() - cpu, time.perf_counter() - wall)
 
     def session(self, seed: int, pool: int | None = None) -> Session:
         """Kernels built, scene uploaded, an empty film."""
@@ -42,7 +67,7 @@ def open_scene(
         value = choices.get(family, "auto")
         settled[family] = scene.integrator.choices.get(family, "auto") if value == "auto" else value
     chosen = Choices(**settled)
-    return OpenScene(open_device(pattern), prepare_for(scene, chosen), chosen)
+    return OpenScene.of(open_device(pattern), scene, chosen)
 
 
 def choice_options(command: Callable) -> Callable:

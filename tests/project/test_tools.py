@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import math
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -37,6 +38,24 @@ def tool(monkeypatch: pytest.MonkeyPatch):
         return importlib.import_module(name)
 
     return load
+
+
+COMMANDS = sorted(path.name for path in TOOLS.glob("*.py") if "__main__" in path.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_tool_says_what_it_does(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.syspath_prepend(TOOLS)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [name, "--help"])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(TOOLS / name), run_name="__main__")
+    assert not ended.value.code
+    shown = capsys.readouterr().out
+    assert shown.lower().startswith("usage: ") and len(shown.splitlines()) > 3
+    assert not list(tmp_path.iterdir())
 
 
 # --- dump_kernel -----------------------------------------------------------------------------------
