@@ -42,7 +42,7 @@ def names() -> set[str]:
 
 
 def is_there(name: str) -> bool:
-    if "NAME" in name or name in MADE_UP:
+    if "NAME" in name or "STAGE" in name or name in MADE_UP:
         return True
     places = [ROOT / name, ROOT / "cl" / name, ROOT / "clvol" / name, DOCS / name]
     return any(place.exists() for place in places) or ("/" not in name and name in names())
