@@ -22,8 +22,8 @@ import bench_room
 import chromatic
 import click
 from bench_cloud import mitsuba_here
+from bench_options import efficiency_options, json_option, mitsuba_option, rounds_option, size_option
 from bench_tables import Figures, Row, Unavailable, judge, save
-from documents import writable
 from folders import SCENES
 from scene_options import choice_options, open_scene
 
@@ -85,100 +85,48 @@ def say_left_out(figures: Figures) -> int:
     return 1 if figures.get(LEFT_OUT) else 0
 
 
-def json_option(command: Callable) -> Callable:
-    """--json FILE."""
-    option = click.option(
-        "--json",
-        "json_path",
-        type=click.Path(path_type=Path),
-        callback=writable,
-        metavar="FILE",
-        help="Write the figures too.",
-    )
-    return option(command)
+Measure = Callable[[str, int, int, float, str, dict[str, str], str | None], Figures]
+"""Takes scene, res, rounds, seconds, Mitsuba's Python, choices and device."""
 
 
-def rounds_option(default: int) -> Callable:
-    """--rounds N, at least 2: a spread needs them."""
-    return click.option("--rounds", type=click.IntRange(min=2), default=default, show_default=True)
+def beside_mitsuba(
+    name: str, scene: str, measure: Measure, show: Callable[[Figures], None], text: str
+) -> click.Command:
+    """A command that compares with Mitsuba on a scene."""
+
+    @main.command(name, help=text)
+    @efficiency_options(scene)
+    def command(
+        mitsuba: str | None,
+        scene: str,
+        res: int,
+        rounds: int,
+        seconds: float,
+        device: str | None,
+        json_path: Path | None,
+        **choices: str,
+    ) -> Outcome:
+        figures = measure(scene, res, rounds, seconds, mitsuba_here(mitsuba), choices, device)
+        show(figures)
+        return json_path, {name: figures}
+
+    return command
 
 
-def size_option(default: int) -> Callable:
-    """--size N."""
-    limits = click.IntRange(min=8)
-    return click.option("--size", type=limits, default=default, show_default=True, help="Voxels per axis.")
-
-
-def check_mitsuba(context: click.Context, parameter: click.Parameter, python: str | None) -> str | None:
-    """A Python that was given must have Mitsuba: told before anything is measured."""
-    if python is not None and not bench_cloud.has_mitsuba(python):
-        raise click.BadParameter(f"{python} is no Python that can import mitsuba and numpy")
-    return python
-
-
-mitsuba_option = click.option(
-    "--mitsuba",
-    callback=check_mitsuba,
-    metavar="PYTHON",
-    help="A Python that has Mitsuba 3.9; without it, one is installed in a cache.",
+cloud = beside_mitsuba(
+    "cloud",
+    CLOUD,
+    bench_cloud.measure_cloud,
+    bench_cloud.show_cloud,
+    "Efficiency beside Mitsuba's, by turns, in CPU time; exit 1 if the pictures differ.",
 )
-
-
-def efficiency_options(scene: str) -> Callable:
-    """The options of a comparison with Mitsuba."""
-
-    def add(command: Callable) -> Callable:
-        for option in (
-            json_option,
-            choice_options,
-            click.option(
-                "--seconds", type=float, default=3.0, show_default=True, help="Length of a side's turn."
-            ),
-            rounds_option(5),
-            click.option("--res", type=click.IntRange(min=1), default=128, show_default=True),
-            click.option("--scene", default=scene, metavar="SCENE", help="A scene that has $res."),
-            mitsuba_option,
-        ):
-            command = option(command)
-        return command
-
-    return add
-
-
-@main.command()
-@efficiency_options(CLOUD)
-def cloud(
-    mitsuba: str | None,
-    scene: str,
-    res: int,
-    rounds: int,
-    seconds: float,
-    device: str | None,
-    json_path: Path | None,
-    **choices: str,
-) -> Outcome:
-    """Efficiency beside Mitsuba's, by turns, in CPU time; exit 1 if the pictures differ."""
-    figures = bench_cloud.measure_cloud(scene, res, rounds, seconds, mitsuba_here(mitsuba), choices, device)
-    bench_cloud.show_cloud(figures)
-    return json_path, {"cloud": figures}
-
-
-@main.command()
-@efficiency_options(bench_room.ROOM)
-def room(
-    mitsuba: str | None,
-    scene: str,
-    res: int,
-    rounds: int,
-    seconds: float,
-    device: str | None,
-    json_path: Path | None,
-    **choices: str,
-) -> Outcome:
-    """The same in a room of smoke and glass, and the time of each stage."""
-    figures = bench_room.measure_room(scene, res, rounds, seconds, mitsuba_here(mitsuba), choices, device)
-    bench_room.show_room(figures)
-    return json_path, {"room": figures}
+room = beside_mitsuba(
+    "room",
+    bench_room.ROOM,
+    bench_room.measure_room,
+    bench_room.show_room,
+    "The same in a room of smoke and glass, and the time of each stage.",
+)
 
 
 @main.command()

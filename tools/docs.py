@@ -16,6 +16,7 @@ from pathlib import Path
 
 import bench
 import click
+from bench_options import mitsuba_option
 from bench_tables import judge
 from docs_tables import ROOT, performance_part, pilot_page, techniques_page
 from documents import between, writable, write
@@ -122,7 +123,7 @@ def pilot(spp: int, rounds: int, more: int, scenes: tuple[str, ...], device: str
 
 
 @main.command()
-@bench.mitsuba_option
+@mitsuba_option
 @bench.rough_option
 @output_option(PERFORMANCE)
 @click.pass_context
@@ -142,7 +143,7 @@ def performance(context: click.Context, mitsuba: str | None, rough: bool, output
 
 
 @main.command("all")
-@bench.mitsuba_option
+@mitsuba_option
 @click.pass_context
 def everything(context: click.Context, mitsuba: str | None) -> int:
     """Everything: pictures, techniques, pilot, performance, in about an hour on two cores.
