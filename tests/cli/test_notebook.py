@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import OpenImageIO as oiio  # noqa: N813
+import pytest
 from places import ROOT
 
 from clvol.picture.estimate import Moments
@@ -23,6 +24,7 @@ def test_a_result_shows_itself_as_a_tone_mapped_png(tmp_path):
     np.testing.assert_array_equal(pixels, np.rint(255 * tone_map(result.image)).astype(np.uint8))
 
 
+@pytest.mark.contract
 def test_the_tutorial_runs(tmp_path):
     quick = {"CLVOL_TUTORIAL_QUICK": "1", "CLVOL_TUTORIAL_FOLDER": str(tmp_path)}
     run = subprocess.run(

@@ -6,7 +6,7 @@ limit out of reach leave the configuration as it is.
 
 import numpy as np
 from probe import grid_volume
-from stat_tests import FALSE_ALARM, TooNoisyError, largest_z, z_score
+from stat_tests import FALSE_ALARM, TooNoisyError, largest_z, pooled, z_score
 
 import clvol
 from clvol.scene.records import (
@@ -171,3 +171,23 @@ def assert_matches(result, expected, bias=0.005, alpha=FALSE_ALARM):
         seen = np.abs(mean - off) > bound * error
         if not seen.all():
             raise TooNoisyError(f"too noisy to see a bias of {bias}: {error / mean}")
+
+
+def assert_pooled(pictures, bias=0.005, alpha=FALSE_ALARM):
+    """Means of independent pictures, each with what is expected of it, agree with that together.
+
+    `pictures` are (Result, expected) pairs.  In each channel relative deviations are weighted by their
+    precision, which shows a bias that all have in common and none shows by itself.  False alarms and power
+    are those of `assert_matches`: all expectations off by the fraction `bias`, up or down, would have failed.
+    """
+    deviations, errors = [], []
+    for result, expected in pictures:
+        mean, error = mean_and_error(result)
+        expected = np.broadcast_to(expected, result.image.shape).astype(float).mean((0, 1))
+        deviations.append(mean / expected - 1)
+        errors.append(error / expected)
+    deviation, error = pooled(deviations, errors)
+    bound = largest_z(deviation.size, alpha) * error
+    assert (np.abs(deviation) < bound).all(), f"together {deviation} off, with an error of {error}"
+    if not (bias - np.abs(deviation) > bound).all():
+        raise TooNoisyError(f"too noisy to see a bias of {bias}: {error}")

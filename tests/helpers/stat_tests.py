@@ -4,6 +4,8 @@ Every test that calls these raises a false alarm with probability FALSE_ALARM at
 comparisons together (Šidák); seeds are fixed, so that a test that passes keeps passing.
 """
 
+import zlib
+
 import numpy as np
 from scipy import stats
 
@@ -13,6 +15,11 @@ FALSE_ALARM = 1e-4
 def sidak(alpha, comparisons):
     """Level of each of several independent comparisons that keeps their joint rate at alpha."""
     return -np.expm1(np.log1p(-alpha) / comparisons)
+
+
+def seed_of(*what):
+    """A fixed seed for what is described, so that renders whose results are pooled are independent."""
+    return zlib.crc32(repr(what).encode())
 
 
 def chi2_p_value(observed, expected, least=10.0):
@@ -50,6 +57,12 @@ def z_score(mean, variance_of_mean, reference, reference_variance=0.0):
 def largest_z(comparisons, alpha=FALSE_ALARM):
     """Two-sided bound on |z| over several comparisons with joint false-alarm rate alpha."""
     return float(stats.norm.isf(sidak(alpha, comparisons) / 2))
+
+
+def pooled(deviations, errors):
+    """Mean of independent deviations along the first axis, weighted by their precision, and its error."""
+    weights = 1 / np.square(np.asarray(errors, float))
+    return (weights * deviations).sum(axis=0) / weights.sum(axis=0), weights.sum(axis=0) ** -0.5
 
 
 class TooNoisyError(AssertionError):

@@ -222,6 +222,7 @@ SCENES = {
 }
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("name", SCENES)
 def test_pictures_have_the_mean_of_independent_samples(name):
     """Image mean and tiles; a difference of 0.5 % of the mean would be seen."""

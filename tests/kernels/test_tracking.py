@@ -83,6 +83,7 @@ def test_collisions_follow_the_exact_distribution(probes, technique, majorant, l
             assert collision_p_value(t, tau, length) > level, where
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize(("technique", "majorant", "lookup"), chromatic_combinations("technique"))
 def test_collisions_of_each_channel_follow_its_distribution(probes, technique, majorant, lookup):
     bound = largest_z(len(CHROMATIC) * len(CHROMATIC_RAYS) * 3 * (BINS + 1))
@@ -131,6 +132,7 @@ def test_transmittance_is_unbiased(probes, transmittance, majorant, lookup):
         assert_transmittance(transmittance, values[:, 0], exact, GREY_CASES, f"{field}, ray {name}")
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize(("transmittance", "majorant", "lookup"), chromatic_combinations("transmittance"))
 def test_transmittance_of_each_channel_is_unbiased(probes, transmittance, majorant, lookup):
     """As a path that follows all channels needs it, and (with exact look-ups) one that follows one."""
@@ -165,6 +167,7 @@ def half_percent_cases(family):
     ]
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize(("technique", "majorant", "lookup"), half_percent_cases("technique"))
 def test_density_is_right_to_half_a_percent(probes, technique, majorant, lookup):
     """The weight of the walks that collide pins the density: 0.5 % more or less of it is rejected."""
@@ -183,6 +186,7 @@ def test_density_is_right_to_half_a_percent(probes, technique, majorant, lookup)
     assert deviations[0] > bound and deviations[2] < -bound
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize(("transmittance", "majorant", "lookup"), half_percent_cases("transmittance"))
 def test_transmittance_is_right_to_half_a_percent(probes, transmittance, majorant, lookup):
     ray, walks = RAYS["oblique"], 1 << 22
@@ -219,6 +223,7 @@ def test_local_majorants_need_fewer_lookups(device):
     assert max(cost["grid"], cost["kdtree"]) < 0.6 * cost["global"]
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("transmittance", TRANSMITTANCES)
 def test_small_transmittances_survive_roulette(device, transmittance):
     """Where most walks come below the roulette's threshold: an error of 1 % in a survivor's weight shows."""

@@ -27,6 +27,8 @@ from clvol.planning.choices import Choices
 from clvol.planning.registry import TECHNIQUES
 from clvol.scene.records import ConstantEmitter, Scene
 
+pytestmark = pytest.mark.contract
+
 UNBIASED = [name for name, choice in TECHNIQUES.items() if not choice.biased]
 
 

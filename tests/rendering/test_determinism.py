@@ -182,6 +182,7 @@ def test_a_time_limit_keeps_whole_passes_too():
     assert digest(cut) == digest(rendered(scene(), spp=cut.samples[1], seed=7))
 
 
+@pytest.mark.contract
 @pytest.mark.usefixtures("ctrl_c")
 def test_an_interrupted_picture_is_not_biased():
     assert_same_picture(interrupted_render(), rendered(scene(), spp=SPP, seed=8))

@@ -34,6 +34,7 @@ def digest(result):
     return hashlib.sha256(result.image.tobytes() + result.variance.tobytes()).hexdigest()
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize(("kind", "technique", "transmittance"), CASES)
 def test_walks_in_short_legs_give_the_same_picture(bounds, kind, technique, transmittance):
     """One step a leg, or four pieces between planes: nearly every walk goes on in later waves."""

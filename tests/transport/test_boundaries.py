@@ -139,12 +139,14 @@ def arrangement(*case):
     return pictured(ARRANGEMENTS[case[0]], seed=100 + CASES.index(case), **view)
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("case", CASES, ids=", ".join)
 def test_media_are_where_their_boundaries_say(case):
     """The camera finds by itself what it is inside of."""
     assert_matches(*arrangement(*case), bias=0.01)
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("where", ["outside", "inside"])
 def test_no_bias_is_shared_by_all_arrangements(where):
     """The weighted mean of all pictures is right, and would not be if they were off by 0.5 %."""
@@ -229,6 +231,7 @@ def _chord(shape, eye):
     return t[0, 1] - t[0, 0]
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("kind", ["box", "mesh"])
 def test_an_absorbing_slab_of_glass_reflects_and_transmits_its_geometric_series(kind):
     """Normal incidence, a sky of 1 on both sides: R + (1 - R)² e / (1 - R e)."""
@@ -259,6 +262,7 @@ def scattering(make, **more):
     return sampled(shapes, LIGHTS, size=(8, 8), **more)
 
 
+@pytest.mark.contract
 def test_media_in_meshes_scatter_as_media_in_intervals():
     a, b = (
         render(scattering(make), spp=1 << 13, seed=seed, transmittance="ratio", majorant="grid")

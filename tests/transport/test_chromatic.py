@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from probe import grid_volume, medium_of, scene_of
 from stat_tests import FALSE_ALARM, assert_same_picture, image_mean, largest_z, z_score
 
@@ -18,6 +19,7 @@ def channel_of(result, channel):
     return mean[channel], variance[channel]
 
 
+@pytest.mark.contract
 def test_a_grey_volume_serves_every_channel_of_a_coloured_albedo():
     scene = scene_of(replace(medium_of(LUMPS, 4.0), albedo=ConstVolume((0.9, 0.6, 0.2))))
     sampled = clvol.render(scene, spp=4096, absorption="sample")  # follows one channel per path

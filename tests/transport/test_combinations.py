@@ -122,6 +122,7 @@ def mean_deviations(results):
     return z, error / means
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("channels", [1, 3], ids=["grey", "chromatic"])
 def test_tiles_of_all_combinations_agree(channels):
     results = pictures(channels)
@@ -130,6 +131,7 @@ def test_tiles_of_all_combinations_agree(channels):
     assert not holm_rejects(tile_p_values(results.values()))
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("channels", [1, 3], ids=["grey", "chromatic"])
 def test_image_means_of_all_combinations_agree_and_half_a_percent_would_show(channels):
     results = pictures(channels)
@@ -143,6 +145,7 @@ def test_image_means_of_all_combinations_agree_and_half_a_percent_would_show(cha
         assert seen.all(), [c for c, ok in zip(results, seen, strict=True) if not ok]
 
 
+@pytest.mark.contract
 def test_a_tile_off_by_a_few_percent_is_rejected():
     results = list(pictures(1).values())
     p = tile_p_values(results)

@@ -105,6 +105,7 @@ def test_a_very_thick_white_medium_loses_no_energy(as_grid):
     assert result.stats["energy_lost_to_caps"] == 0
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("scale", [1e-7, 1e-5, 1e-3])
 def test_a_very_thin_medium_scatters_as_often_as_it_should(scale):
     """Radiance under one directional light is proportional to the optical thickness, however small."""
@@ -174,6 +175,7 @@ def test_the_last_filter_sample_at_the_films_edge_is_still_on_the_film():
     assert np.isfinite(result.image).all()
 
 
+@pytest.mark.contract
 def test_a_lamp_far_away_is_a_sun():
     """Lights have no part in the coordinates that positions are taken in."""
     scene, distance = lumpy_scene(emitters=(DirectionalEmitter((2.0,), (0.6, -0.8, 0.0)),)), 1e7

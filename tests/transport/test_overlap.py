@@ -125,6 +125,7 @@ def in_their_own_radiance(*case):
     return render(scene, spp=1 << 14, seed=seed_of(*case) + 1, **choices)
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("case", CASES, ids="-".join)
 def test_overlapping_media_glow_and_scatter_as_their_sum(case):
     kind, technique, transmittance = case

@@ -97,6 +97,7 @@ def test_rough_glass_loses_what_scatters_twice_at_its_facets(medium, known, unce
     assert 2 * largest_z(1) * error < 0.005 * known
 
 
+@pytest.mark.contract
 def test_a_half_space_behind_smooth_glass_reflects_what_giovanelli_says():
     """n 1.5, albedo 0.9, isotropic: 0.2600 at normal incidence, 0.0400 of it specular (NUMBERS.md).  By
     reciprocity, what is seen along the normal under a uniform sky; nothing gets through the slab."""
@@ -242,6 +243,7 @@ def test_a_spot_in_fog_scatters_once_as_its_quadrature():
     assert_matches(show(scene, spp=1 << 15, seed=8), answer)
 
 
+@pytest.mark.contract
 def test_paths_that_find_lamps_and_paths_that_sample_them_see_one_picture():
     """A bias of 1 % of either would be seen."""
     shapes = [

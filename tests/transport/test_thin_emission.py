@@ -42,6 +42,7 @@ def emitted(profile, glow, scale):
     return (sigma * radiance * np.exp(-depth)).sum(axis=1) * step
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize(
     ("technique", "colours"),
     [(t, c) for c in SCALES for t in TECHNIQUES if c == "grey" or registry.TECHNIQUES[t].all_channels],

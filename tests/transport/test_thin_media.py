@@ -44,6 +44,7 @@ def rendered(scene):
     return clvol.render(scene, spp=4096, seed=2, sampler="sobol")
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("surfaces", [False, True], ids=["alone", "surfaces"])
 @pytest.mark.parametrize("kind", ["homogeneous", "grid"])
 def test_a_thin_slab_absorbs_and_emits_like_a_thick_one(kind, surfaces):
@@ -60,6 +61,7 @@ def test_a_thin_ball_absorbs_like_a_thick_one(surfaces):
         assert_mean(rendered(scene), np.exp(-2.0))
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("kind", ["homogeneous", "grid"])
 def test_a_thin_slab_scatters_like_a_thick_one(kind):
     """The same random numbers make the same paths, scaled."""

@@ -85,6 +85,7 @@ def test_furnace_of_homogeneous_media_is_one(eye, absorption):
     assert_matches(result, 1.0)
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("eye, absorption", FURNACES)
 def test_furnace_of_grids_is_one(eye, absorption):
     scene = furnace(gridded_pair, eye, UNLIT[:1])
@@ -102,6 +103,7 @@ def test_a_furnace_of_albedo_a_little_below_one_is_noticed():
 # -- published slabs ---------------------------------------------------------------------------------
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("albedo, g, thickness, reflected, transmitted", SLABS)
 def test_slabs_reflect_and_transmit_what_is_published(albedo, g, thickness, reflected, transmitted):
     """Homogeneous (test_techniques.py has grids), within 3 standard errors of at most 0.0005: each of the 8
@@ -317,6 +319,7 @@ def test_albedo_comes_from_grids_of_one_and_three_channels(absorption):
 # -- overlapping media -------------------------------------------------------------------------------
 
 
+@pytest.mark.contract
 def test_overlapping_media_are_one_medium_of_summed_coefficients():
     """Nearest voxels in the unit cube and a homogeneous medium over half of it, against voxels of the sum."""
     together, summed = overlapping_media(), voxels_of_the_sum()
