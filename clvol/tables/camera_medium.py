@@ -16,6 +16,7 @@ from clvol.scene import records
 from clvol.scene.boundaries import Boundaries, is_clipped
 from clvol.scene.primitives import mesh_of
 from clvol.tables.camera import camera_rays
+from clvol.volumes.grid import SparseGrid
 
 log = logging.getLogger("clvol")
 
@@ -49,7 +50,7 @@ def _endless(medium: records.Medium) -> bool:
         return False
     if isinstance(medium.sigma_t, records.ConstVolume):
         return any(medium.sigma_t.value)
-    return medium.sigma_t.grid.background > 0
+    return isinstance(medium.sigma_t.grid, SparseGrid) and medium.sigma_t.grid.background > 0
 
 
 def _check_far_light(scene: records.Scene, medium: records.Medium) -> None:
@@ -104,7 +105,8 @@ def starts_inside(shape: records.Shape, starts: np.ndarray, towards: np.ndarray)
         t, outwards = _round(shape.kind, o, d)
     else:
         t, outwards = _triangles(mesh_of(shape), o, d)
-    return np.isfinite(t) & (outwards != shape.flip_normals)
+    behind: np.ndarray = np.isfinite(t) & (outwards != shape.flip_normals)
+    return behind
 
 
 def _disk(o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -44,7 +44,8 @@ def _shadowing(distribution: str, alpha: float, cosine: np.ndarray) -> np.ndarra
     sine = np.sqrt(np.maximum(1 - cosine**2, 1e-30))
     a = np.maximum(cosine, 0) / (alpha * sine)
     if distribution == "ggx":
-        return 2 * a / (a + np.sqrt(a**2 + 1))
+        ggx: np.ndarray = 2 * a / (a + np.sqrt(a**2 + 1))
+        return ggx
     cut = np.minimum(a, 1.6)
     fit = (3.535 * cut + 2.181 * cut**2) / (1 + 2.276 * cut + 2.577 * cut**2)
     return np.where(a < 1.6, fit, 1.0)

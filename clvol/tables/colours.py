@@ -22,11 +22,12 @@ def rgb(value: Sequence[float] | float) -> np.ndarray:
 
 def luminance(colours: np.ndarray) -> np.ndarray:
     """Luminance of colours, float (..., 3)."""
-    return colours @ LUMINANCE
+    found: np.ndarray = colours @ LUMINANCE
+    return found
 
 
 def mean_luminance(picture: np.ndarray) -> float:
     """Mean luminance of a picture, float (h, w, 3)."""
     height, width, _ = picture.shape
     total = sum(float(luminance(picture[rows]).sum()) for rows in bands(height, width))
-    return total / (height * width)
+    return float(total / (height * width))

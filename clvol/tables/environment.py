@@ -34,8 +34,10 @@ def _cells(radiance: np.ndarray, band: slice) -> np.ndarray:
     height = len(radiance)
     y = luminance(radiance[band.start : band.stop + 1].astype(np.float64))
     y = y + np.roll(y, -1, axis=1)
-    cells = y[:-1] + y[1:]
-    return cells * np.sin((np.arange(band.start, band.stop) + 0.5) * np.pi / (height - 1))[:, None]
+    cells: np.ndarray = y[:-1] + y[1:]
+    sine = np.sin((np.arange(band.start, band.stop) + 0.5) * np.pi / (height - 1))
+    cells *= sine[:, None]
+    return cells
 
 
 def _row_cdfs(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

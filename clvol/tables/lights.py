@@ -58,20 +58,22 @@ def light_table(
     """
     emitters = emitter_order(scene)
     shapes = () if surfaces is None else surfaces.shapes
-    shining = [number for number, shape in enumerate(shapes) if shape.emission is not None]
+    shining = [(n, shape.emission) for n, shape in enumerate(shapes) if shape.emission is not None]
     table = np.zeros(len(emitters) + len(shining), layout.EMITTER)
     power = np.zeros(len(table))
     for i, emitter in enumerate(emitters):
         power[i] = _describe_emitter(table[i], emitter, centre, radius)
     faces, cdf = [np.zeros(0, np.uint32)], [np.zeros(0, np.float32)]
-    for i, number in enumerate(shining, len(emitters)):
-        if shapes[number].kind in QUADRICS:
-            table[i]["primitive"], table[i]["count"] = quadric_primitive(surfaces, number), 1
-        else:
-            table[i]["first"] = sum(map(len, faces))
-            for arrays, run in zip((faces, cdf), mesh_run(surfaces, number, table[i]), strict=True):
-                arrays.append(run)
-        power[i] = _describe_area(table[i], shapes[number], number)
+    if surfaces is not None:
+        for i, (number, emission) in enumerate(shining, len(emitters)):
+            if shapes[number].kind in QUADRICS:
+                table[i]["primitive"], table[i]["count"] = quadric_primitive(surfaces, number), 1
+            else:
+                table[i]["first"] = sum(map(len, faces))
+                members, shares = mesh_run(surfaces, number, table[i])
+                faces.append(members)
+                cdf.append(shares)
+            power[i] = _describe_area(table[i], shapes[number], emission, number)
     order = np.argsort(power, kind="stable")
     if len(order):
         first = 0 if emitters and _is_environment(emitters[0]) else order[-1]
@@ -133,7 +135,7 @@ def spot_solid_angle(cutoff: float, beam: float) -> float:
     It is 2π (1 − (sin c − sin b) / (c − b)), written without the difference of near sines.
     """
     beam = min(beam, cutoff)
-    return 2 * np.pi * (1 - np.cos((cutoff + beam) / 2) * np.sinc((cutoff - beam) / (2 * np.pi)))
+    return 2 * np.pi * float(1 - np.cos((cutoff + beam) / 2) * np.sinc((cutoff - beam) / (2 * np.pi)))
 
 
 def envmap_arrays(emitter: records.EnvmapEmitter) -> dict[str, np.ndarray]:
@@ -157,14 +159,14 @@ def _is_environment(emitter: records.Emitter) -> bool:
     return isinstance(emitter, (records.ConstantEmitter, records.EnvmapEmitter))
 
 
-def _describe_area(record: np.void, shape: records.Shape, number: int) -> float:
+def _describe_area(record: np.void, shape: records.Shape, emission: records.Spectrum, number: int) -> float:
     """Fill in an area light and return its power; a mesh's area is there already."""
     if shape.kind in QUADRICS:
         record["area"] = quadric_area(shape)
     record["kind"] = layout.enum("EMITTER", "area")
     record["shape"] = number
-    record["value"] = rgb(shape.emission)
-    return np.pi * float(record["area"]) * float(luminance(rgb(shape.emission)))
+    record["value"] = rgb(emission)
+    return np.pi * float(record["area"]) * float(luminance(rgb(emission)))
 
 
 def _describe_emitter(record: np.void, emitter: records.Emitter, centre: np.ndarray, radius: float) -> float:

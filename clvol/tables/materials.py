@@ -94,11 +94,14 @@ def _record(side: Side, textures: TextureTable, tables: list[np.ndarray]) -> np.
     record["ior"] = getattr(bsdf, "int_ior", 1.0) / getattr(bsdf, "ext_ior", 1.0)
     if isinstance(bsdf, materials.Conductor | materials.RoughConductor):
         record["eta"], record["k"] = (rgb(value) for value in (bsdf.eta, bsdf.k))
-    if kind.startswith("ROUGH"):
+    if isinstance(bsdf, materials.RoughDielectric | materials.RoughConductor | materials.RoughPlastic):
+        along_u, along_v = (
+            (bsdf.alpha, bsdf.alpha)
+            if isinstance(bsdf, materials.RoughPlastic)
+            else (bsdf.alpha_u, bsdf.alpha_v)
+        )
         record["distribution"] = layout.enum("DISTRIBUTION", bsdf.distribution)
-        both = getattr(bsdf, "alpha", None)
-        record["alpha_u"] = max(getattr(bsdf, "alpha_u", both), MIN_ALPHA)
-        record["alpha_v"] = max(getattr(bsdf, "alpha_v", both), MIN_ALPHA)
+        record["alpha_u"], record["alpha_v"] = max(along_u, MIN_ALPHA), max(along_v, MIN_ALPHA)
     if isinstance(bsdf, materials.Plastic | materials.RoughPlastic):
         _set_coat(record, bsdf, tables)
     return record

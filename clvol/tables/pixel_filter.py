@@ -26,7 +26,8 @@ def filter_cdf(rfilter: ReconstructionFilter) -> np.ndarray:
     """
     mass = np.diff(_integral(rfilter, np.linspace(-rfilter.radius, rfilter.radius, FILTER_BINS + 1)))
     rows = np.stack([np.abs(mass), mass]) if rfilter.signed else mass[None]
-    sums = np.concatenate([np.zeros((len(rows), 1)), np.cumsum(rows, axis=1)], axis=1) / np.abs(mass).sum()
+    sums = np.concatenate([np.zeros((len(rows), 1)), np.cumsum(rows, axis=1)], axis=1)
+    sums /= np.abs(mass).sum()
     return sums.astype(np.float32).reshape(-1)
 
 
@@ -34,14 +35,16 @@ def _integral(rfilter: ReconstructionFilter, x: np.ndarray) -> np.ndarray:
     """Integral of the filter up to each `x`, but for a constant and a factor; float64."""
     r = rfilter.radius
     if rfilter.kind == "tent":
-        return np.sign(x) * (np.abs(x) / r - 0.5 * (x / r) ** 2)
+        tent: np.ndarray = np.sign(x) * (np.abs(x) / r - 0.5 * (x / r) ** 2)
+        return tent
     if rfilter.kind == "gaussian":  # cut at the radius and lowered to reach 0 there, as in Mitsuba
         scale = rfilter.stddev * math.sqrt(2)
         floor = math.exp(-((r / scale) ** 2))
         erf = np.array([math.erf(position / scale) for position in x])
         return 0.5 * scale * math.sqrt(math.pi) * erf - floor * x
     if rfilter.kind == "mitchell":
-        return np.sign(x) * _mitchell_integral(np.abs(x), rfilter.b, rfilter.c)
+        mitchell: np.ndarray = np.sign(x) * _mitchell_integral(np.abs(x), rfilter.b, rfilter.c)
+        return mitchell
     if rfilter.kind == "lanczos":
         nodes, weights = np.polynomial.legendre.leggauss(4)
         middle, half = (x[1:] + x[:-1]) / 2, (x[1:] - x[:-1]) / 2
@@ -55,4 +58,5 @@ def _mitchell_integral(x: np.ndarray, b: float, c: float) -> np.ndarray:
     inner = np.polyint([12 - 9 * b - 6 * c, -18 + 12 * b + 6 * c, 0, 6 - 2 * b])
     outer = np.polyint([-b - 6 * c, 6 * b + 30 * c, -12 * b - 48 * c, 8 * b + 24 * c])
     beyond = np.polyval(outer, np.clip(x, 1, 2)) - np.polyval(outer, 1)
-    return np.polyval(inner, np.minimum(x, 1)) + beyond
+    whole: np.ndarray = np.polyval(inner, np.minimum(x, 1)) + beyond
+    return whole

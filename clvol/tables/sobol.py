@@ -60,5 +60,5 @@ def reverse_bits(x: np.ndarray) -> np.ndarray:
 def samples_of_each(first: int, count: int) -> np.ndarray:
     """How many of the samples `first` to `first + count` each randomisation has; int64 (RANDOMIZATIONS,)."""
     numbers = np.arange(RANDOMIZATIONS)
-    until = lambda n: (n - numbers + RANDOMIZATIONS - 1) // RANDOMIZATIONS  # noqa: E731
-    return until(first + count) - until(first)
+    first_of, end_of = ((n - numbers + RANDOMIZATIONS - 1) // RANDOMIZATIONS for n in (first, first + count))
+    return end_of - first_of

@@ -118,9 +118,9 @@ def _triangles(
             rows[:, [1, 2]] = rows[:, [2, 1]]  # a mirror turns the winding, and outside stays outside
         rows[:, 3] = number
         table[number]["normals"], table[number]["uvs"] = mesh.normals is not None, mesh.uvs is not None
-        if mesh.normals is not None:
+        if normals is not None and mesh.normals is not None:
             _transform_normals(mesh.normals, shape.to_world[:3, :3], normals[first : first + len(here)])
-        if mesh.uvs is not None:
+        if uvs is not None and mesh.uvs is not None:
             uvs[first : first + len(here)] = mesh.uvs
         first += len(here)
         filled += len(kept)
@@ -156,7 +156,7 @@ def _outward(shape: records.Shape) -> records.Shape:
     elif shape.kind == "sphere":
         flaws = _turned([], shape.flip_normals)
     else:
-        if shape.kind == "mesh" and not shape.flip_normals:
+        if shape.mesh is not None and not shape.flip_normals:
             mesh, turned = facing_outwards(shape.mesh)
             if turned:
                 log.warning("%s bounds a medium, but has %s: they are turned", name, INWARDS)
