@@ -8,19 +8,12 @@
 #include "bsdf/conductor.h"
 #include "bsdf/dielectric.h"
 #include "bsdf/diffuse.h"
+#include "bsdf/kinds.h"
 #include "bsdf/plastic.h"
 #include "bsdf/rough_conductor.h"
 #include "bsdf/rough_dielectric.h"
 #include "bsdf/rough_plastic.h"
 #include "bsdf/sample.h"
-
-/* Without a look where the scene has one kind only. */
-#define BSDF_KINDS                                                                                            \
-    (CLVOL_BSDF_NULL + CLVOL_BSDF_DIFFUSE + CLVOL_BSDF_DIELECTRIC + CLVOL_BSDF_THIN_DIELECTRIC +              \
-     CLVOL_BSDF_ROUGH_DIELECTRIC + CLVOL_BSDF_CONDUCTOR + CLVOL_BSDF_ROUGH_CONDUCTOR + CLVOL_BSDF_PLASTIC +   \
-     CLVOL_BSDF_ROUGH_PLASTIC)
-#define IS_BSDF(material, name) \
-    (CLVOL_BSDF_##name && (BSDF_KINDS == 1 || (material)->kind == MATERIAL_##name))
 
 /* Share of the surface that is there at all. */
 INLINE float material_opacity(const Scene *scene, __global const Material *material, float2 uv)
@@ -30,20 +23,6 @@ INLINE float material_opacity(const Scene *scene, __global const Material *mater
         return material->opacity * texture_value(scene, material->opacity_texture, uv).x;
 #endif
     return material->opacity;
-}
-
-/* Only delta lobes: no light can be sampled for it. */
-INLINE bool material_is_smooth(__global const Material *material)
-{
-    return IS_BSDF(material, NULL) || IS_BSDF(material, DIELECTRIC) || IS_BSDF(material, THIN_DIELECTRIC) ||
-           IS_BSDF(material, CONDUCTOR);
-}
-
-/* Takes wi and wo on either side as they are; others are seen from +z alone. */
-INLINE bool material_transmits(__global const Material *material)
-{
-    return IS_BSDF(material, NULL) || IS_BSDF(material, DIELECTRIC) || IS_BSDF(material, THIN_DIELECTRIC) ||
-           IS_BSDF(material, ROUGH_DIELECTRIC);
 }
 
 /* What a ray that goes straight on keeps: the mask's holes, and what is left passes straight on itself. */

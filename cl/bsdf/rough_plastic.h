@@ -1,6 +1,6 @@
 /* A diffuse base under a coat of microfacets.
 
-   What the coat lets through, over the cosine of incidence in TRANSMITTANCE_ENTRIES steps, is in material_tables
+   What the coat lets through, over the cosine of incidence in COAT_ENTRIES steps, is in material_tables
    (clvol/tables/materials.py). */
 #ifndef CLVOL_BSDF_ROUGH_PLASTIC_H
 #define CLVOL_BSDF_ROUGH_PLASTIC_H
@@ -10,13 +10,11 @@
 #include "bsdf/plastic.h"
 #include "bsdf/sample.h"
 
-#define TRANSMITTANCE_ENTRIES 64
-
 INLINE float coat_transmittance(const Scene *scene, __global const Material *material, float cosine)
 {
     __global const float *table = scene->material_tables + material->table;
-    const float at = cosine * (float)(TRANSMITTANCE_ENTRIES - 1);
-    const int entry = clamp_int((int)at, 0, TRANSMITTANCE_ENTRIES - 2);
+    const float at = cosine * (float)(COAT_ENTRIES - 1);
+    const int entry = clamp_int((int)at, 0, COAT_ENTRIES - 2);
     return lerp(table[entry], table[entry + 1], at - (float)entry);
 }
 

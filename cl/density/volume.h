@@ -10,7 +10,8 @@
 #include "geometry/lattice_tree.h"
 #endif
 
-#define BRICK_SAMPLES 729
+#define BRICK_SHIFT 3 /* cells are counted in BRICK_CELLS = 1 << BRICK_SHIFT */
+#define BRICK_LAYER (BRICK_EDGE * BRICK_EDGE)
 
 /* The interpolation cell that holds a point: its first corner's first channel, and the place inside. */
 typedef struct {
@@ -38,11 +39,12 @@ INLINE VolumeCell volume_cell(const Scene *scene, __global const Volume *volume,
     const int ix = min_int((int)x, volume->size[0] - 2);
     const int iy = min_int((int)y, volume->size[1] - 2);
     const int iz = min_int((int)z, volume->size[2] - 2);
-    const uint brick = volume_brick(scene, volume, ix >> 3, iy >> 3, iz >> 3);
+    const uint brick = volume_brick(scene, volume, ix >> BRICK_SHIFT, iy >> BRICK_SHIFT, iz >> BRICK_SHIFT);
+    const int in_brick = BRICK_CELLS - 1;
     VolumeCell cell;
     cell.stride = CLVOL_HAS_COLOURED_VOLUME ? volume->channels : 1;
     cell.corner = scene->bricks + (size_t)(volume->brick_offset + brick) * BRICK_SAMPLES +
-                  ((iz & 7) * 81 + (iy & 7) * 9 + (ix & 7)) * cell.stride;
+                  ((iz & in_brick) * BRICK_LAYER + (iy & in_brick) * BRICK_EDGE + (ix & in_brick)) * cell.stride;
     cell.fx = x - (float)ix;
     cell.fy = y - (float)iy;
     cell.fz = z - (float)iz;
@@ -52,17 +54,17 @@ INLINE VolumeCell volume_cell(const Scene *scene, __global const Volume *volume,
 /* The corner that lies beyond the given fractions of the cell: (½, ½, ½) takes the nearest sample. */
 INLINE int cell_corner(const VolumeCell *cell, float x, float y, float z)
 {
-    return ((cell->fx >= x ? 1 : 0) + (cell->fy >= y ? 9 : 0) + (cell->fz >= z ? 81 : 0)) * cell->stride;
+    return ((cell->fx >= x ? 1 : 0) + (cell->fy >= y ? BRICK_EDGE : 0) + (cell->fz >= z ? BRICK_LAYER : 0)) * cell->stride;
 }
 
 INLINE float cell_trilinear(const VolumeCell *cell, int channel)
 {
-    const int s = cell->stride;
+    const int s = cell->stride, y = BRICK_EDGE, z = BRICK_LAYER;
     __global const float *c = cell->corner + channel;
     const float c00 = lerp(c[0], c[s], cell->fx);
-    const float c10 = lerp(c[9 * s], c[10 * s], cell->fx);
-    const float c01 = lerp(c[81 * s], c[82 * s], cell->fx);
-    const float c11 = lerp(c[90 * s], c[91 * s], cell->fx);
+    const float c10 = lerp(c[y * s], c[(y + 1) * s], cell->fx);
+    const float c01 = lerp(c[z * s], c[(z + 1) * s], cell->fx);
+    const float c11 = lerp(c[(z + y) * s], c[(z + y + 1) * s], cell->fx);
     return lerp(lerp(c00, c10, cell->fy), lerp(c01, c11, cell->fy), cell->fz);
 }
 

@@ -14,8 +14,6 @@
 #include "geometry/quadric.h"
 #include "geometry/triangle.h"
 
-#define NO_PRIMITIVE 0xFFFFFFFFu
-
 typedef struct {
     float t;
     float u, v;     /* barycentric weights of the second and third vertex; 0 on quadrics */
@@ -35,12 +33,7 @@ INLINE bool is_target(const Hit *hit, const Target *target)
            (hit->primitive - target->first < target->count && hit->t >= target->near_);
 }
 
-#define NODE_ROWS 8u
-#define PACKET_ROWS 10u
-#define PACKET_WIDTH 8u
-#define BVH_LEAF 0x80000000u
-#define BVH_HAS_QUADRICS 0x40000000u
-#define BVH_NUMBER 0x3FFFFFFFu
+#define BVH_NUMBER (BVH_HAS_QUADRICS - 1u) /* of a packet, in its reference */
 #define REACH 1.0000020f
 #define STEEPEST 1.0e38f
 
@@ -155,7 +148,7 @@ INLINE void test_triangles(__global const float8 *packet, Query *query)
     uint lanes = lane_bits(hits.inside);
     if (lanes == 0u)
         return;
-    float t[PACKET_WIDTH], v[PACKET_WIDTH], w[PACKET_WIDTH], det[PACKET_WIDTH];
+    float t[BVH_PACKET], v[BVH_PACKET], w[BVH_PACKET], det[BVH_PACKET];
     const float8 t8 = packet_t(packet, &hits, &query->ray);
     lanes &= lane_bits(t8 >= query->after_t & t8 <= query->best.t);
     if (lanes == 0u)
@@ -174,7 +167,7 @@ INLINE void test_triangles(__global const float8 *packet, Query *query)
 
 INLINE void test_leaf(const Scene *scene, uint reference, Query *query)
 {
-    __global const float8 *packet = scene->bvh_triangles + (size_t)(reference & BVH_NUMBER) * PACKET_ROWS;
+    __global const float8 *packet = scene->bvh_triangles + (size_t)(reference & BVH_NUMBER) * BVH_PACKET_ROWS;
 #if CLVOL_HAS_TRIANGLES
     test_triangles(packet, query);
 #endif
@@ -182,7 +175,7 @@ INLINE void test_leaf(const Scene *scene, uint reference, Query *query)
     if (reference & BVH_HAS_QUADRICS) {
         const uint triangles = ((__global const uint *)(scene->bvh_nodes + 7))[0];
         __global const uint *primitives = (__global const uint *)(packet + 9);
-        for (uint lane = 0u; lane < PACKET_WIDTH; ++lane) {
+        for (uint lane = 0u; lane < BVH_PACKET; ++lane) {
             const uint primitive = primitives[lane];
             if (primitive < triangles || primitive == NO_PRIMITIVE)
                 continue;
@@ -212,7 +205,7 @@ INLINE uint nearest_child(ulong *stack, uint *height, uint lanes, float8 entry8,
     const uint others = lanes & (lanes - 1u);
     if (others == 0u)
         return references[first];
-    float entry[PACKET_WIDTH];
+    float entry[BVH_PACKET];
     vstore8(entry8, 0, entry);
     ulong nearest = waiting(entry[first], references[first]);
     const uint base = *height;
@@ -251,7 +244,7 @@ INLINE Hit closest_hit(const Scene *scene, Ray ray, float after_t, uint after_pr
     uint height = 0u, reference = 0u;
     do {
         while (!(reference & BVH_LEAF)) {
-            __global const float8 *node = scene->bvh_nodes + (size_t)reference * NODE_ROWS;
+            __global const float8 *node = scene->bvh_nodes + (size_t)reference * BVH_NODE_ROWS;
             float8 entry;
             const uint lanes = children_met(node, &query.slabs, after_t, query.best.t, &entry);
             if (lanes == 0u)
@@ -282,7 +275,7 @@ INLINE bool any_hit(const Scene *scene, Ray ray, float t_max, const Target *targ
                 query.found = false; /* and only what comes before it counts from now on */
             continue;
         }
-        __global const float8 *node = scene->bvh_nodes + (size_t)reference * NODE_ROWS;
+        __global const float8 *node = scene->bvh_nodes + (size_t)reference * BVH_NODE_ROWS;
         __global const uint *references = (__global const uint *)(node + 6);
         float8 entry;
         for (uint lanes = children_met(node, &query.slabs, 0.0f, t_max, &entry); lanes != 0u; lanes &= lanes - 1u) {

@@ -37,6 +37,8 @@ INLINE int lattice_axis_begin(LatticeAxis *axis, float o, float d, int cells, fl
     return cell;
 }
 
+/* Adding up `offset` does not drift: it grows from plane to plane, and edges are powers of two, so that a sum is
+   exact unless it reaches the next binade.  All that is ever rounded is less than a unit in its last place. */
 INLINE void lattice_axis_step(LatticeAxis *axis)
 {
     axis->left -= 1;

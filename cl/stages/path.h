@@ -8,8 +8,6 @@
 #include "core/scene.h"
 #include "tracking/tally.h"
 
-#define NO_JOB 0xFFFFFFFFu
-
 INLINE __global uint *queue_counter(const Scene *scene, uint group, uint queue)
 {
     return scene->counts + group * COUNTER_STRIDE + queue;
@@ -147,7 +145,7 @@ INLINE void reset_ray(const Scene *scene, uint slot)
 #if CLVOL_HAS_PASSABLE
     set_path_stretch(scene, slot, 0);
     set_path_after_t(scene, slot, 0.0f);
-    set_path_after_primitive(scene, slot, 0xFFFFFFFFu); /* NO_PRIMITIVE */
+    set_path_after_primitive(scene, slot, NO_PRIMITIVE);
 #endif
 }
 

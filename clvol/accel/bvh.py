@@ -17,14 +17,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from clvol import layout
 from clvol.accel.bvh_split import BinaryTree, half_area, split_boxes
 from clvol.errors import SceneError
-from clvol.layout import BVH_PACKET, BVH_WIDTH
+from clvol.layout import BVH_NODE_ROWS, BVH_PACKET, BVH_PACKET_ROWS, BVH_WIDTH
 
-NODE_ROWS, PACKET_ROWS = 8, 10
-LEAF, HAS_QUADRICS = np.uint32(1 << 31), np.uint32(1 << 30)
-"""Marks in a child's reference; what remains is the number of the node, or of the packet."""
-NO_PRIMITIVE = np.uint32(0xFFFFFFFF)
+LEAF, HAS_QUADRICS = np.uint32(layout.BVH_LEAF), np.uint32(layout.BVH_HAS_QUADRICS)
+NO_PRIMITIVE = np.uint32(layout.NO_PRIMITIVE)
 PADDING = np.float32(2.0**-20)
 _MOST_COORDINATE = 1e12
 """The triangle test multiplies three coordinates."""
@@ -151,7 +150,7 @@ def _collapse(tree: BinaryTree) -> tuple[np.ndarray, np.ndarray, int, int]:
         references = np.zeros(slots.shape, np.uint32)
         references[inner] = known + np.arange(np.count_nonzero(inner))
         references[leaf] = (packets + np.arange(np.count_nonzero(leaf))).astype(np.uint32) | LEAF
-        block = np.zeros((len(slots), NODE_ROWS, BVH_WIDTH), np.float32)
+        block = np.zeros((len(slots), BVH_NODE_ROWS, BVH_WIDTH), np.float32)
         for axis in range(3):
             block[:, 2 * axis] = np.where(used, tree.box[axis][slots], np.inf)
             block[:, 2 * axis + 1] = np.where(used, -tree.box[axis + 3][slots], -np.inf)
@@ -186,7 +185,7 @@ def _widest_children(tree: BinaryTree, area: np.ndarray, nodes: np.ndarray) -> n
 
 def _packets(tree: BinaryTree, leaves: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """One packet a leaf; lanes of quadrics and unused ones have three equal vertices, which no ray hits."""
-    packets = np.zeros((len(leaves), PACKET_ROWS, BVH_WIDTH), np.float32)
+    packets = np.zeros((len(leaves), BVH_PACKET_ROWS, BVH_WIDTH), np.float32)
     lanes = np.arange(BVH_PACKET)
     for first in range(0, len(leaves), _CHUNK // BVH_PACKET):
         part = leaves[first : first + _CHUNK // BVH_PACKET]

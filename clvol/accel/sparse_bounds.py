@@ -16,8 +16,8 @@ import numpy as np
 from clvol.accel.bounds import Bounds, slackened
 from clvol.accel.cells import Cells
 from clvol.base.types import triple
+from clvol.layout import BRICK_CELLS
 from clvol.volumes.brick_samples import BOUND_CELLS
-from clvol.volumes.sparse_places import BRICK_CELLS
 from clvol.volumes.tree import (
     NODE_EDGE,
     Tier,

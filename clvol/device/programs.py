@@ -27,7 +27,12 @@ if TYPE_CHECKING:
     from clvol.planning.config import KernelConfig
 
 LAYOUT = "layout"
-"""What messages call the generated text of records, enums and path state."""
+SHARED = {
+    "CLVOL_SHARED_HEADER": "layout, shared",
+    "CLVOL_BSDFS_HEADER": "layout, kinds of BSDF",
+    "CLVOL_PHASES_HEADER": "layout, kinds of phase function",
+}
+"""Slots of generated text, and what messages call it."""
 BUILD_OPTIONS = ("-cl-std=CL1.2", "-w")
 """No relaxed-math flag: they may delete the checks for NaN and infinity (METHODS §7).  -w: compilers
 warn wherever a feature's macro makes a condition constant, which is how the kernels are composed."""
@@ -63,11 +68,14 @@ def expand(text: str, macros: Mapping[str, int], slots: Mapping[str, str], recor
     Only the macros that occur in it are defined: caches are keyed on the text, and stages that a choice
     does not touch are not built again.
     """
+    shared = layout.shared_text(), layout.kinds_text("BSDF"), layout.kinds_text("PHASE")
+    generated = {LAYOUT: records} | dict(zip(SHARED.values(), shared, strict=True))
 
     def read(name: str) -> str:
-        return records if name == LAYOUT else kernel_source(name)
+        return generated[name] if name in generated else kernel_source(name)
 
-    expanded = Preprocessor(read, macros, {**slots, "CLVOL_LAYOUT_HEADER": LAYOUT}).expand(text, "unit")
+    slots = {**slots, **SHARED, "CLVOL_LAYOUT_HEADER": LAYOUT}
+    expanded = Preprocessor(read, macros, slots).expand(text, "unit")
     body = "\n".join(expanded) + "\n"
     used = set(re.findall(r"\bCLVOL_\w+", body))
     defines = [f"#define {name} {value}\n" for name, value in macros.items() if name in used]

@@ -6,14 +6,25 @@ belongs here, only its shape, and nothing of clvol but its errors is imported.
 """
 
 from clvol.layout.arguments import ARGUMENTS, Argument, arguments
+from clvol.layout.bsdfs import BSDF_FACTS, BSDFS, BsdfFacts
 from clvol.layout.constants import (
     BLACKBODY_BINS,
     BLACKBODY_MIDDLE_KELVIN,
+    BRICK_CELLS,
+    BRICK_EDGE,
+    BRICK_SAMPLES,
+    BVH_HAS_QUADRICS,
+    BVH_LEAF,
     BVH_MOST_DEPTH,
+    BVH_NODE_ROWS,
     BVH_PACKET,
+    BVH_PACKET_ROWS,
     BVH_STACK,
     BVH_WIDTH,
+    COAT_ENTRIES,
     COUNTER_STRIDE,
+    NO_JOB,
+    NO_PRIMITIVE,
     RANDOMIZATIONS,
 )
 from clvol.layout.path_state import (
@@ -31,7 +42,6 @@ from clvol.layout.path_state import (
     slot_fields,
 )
 from clvol.layout.records import (
-    BSDFS,
     EMITTER,
     ENUMS,
     ENVMAP,
@@ -46,17 +56,27 @@ from clvol.layout.records import (
     VOLUME,
     enum,
 )
-from clvol.layout.text import layout_text, record_text
+from clvol.layout.shared_text import kinds_text, record_text, shared_text
+from clvol.layout.text import layout_text
 
 __all__ = [
     "ARGUMENTS",
     "BLACKBODY_BINS",
     "BLACKBODY_MIDDLE_KELVIN",
+    "BRICK_CELLS",
+    "BRICK_EDGE",
+    "BRICK_SAMPLES",
     "BSDFS",
+    "BSDF_FACTS",
+    "BVH_HAS_QUADRICS",
+    "BVH_LEAF",
     "BVH_MOST_DEPTH",
+    "BVH_NODE_ROWS",
     "BVH_PACKET",
+    "BVH_PACKET_ROWS",
     "BVH_STACK",
     "BVH_WIDTH",
+    "COAT_ENTRIES",
     "COUNTER_STRIDE",
     "COUNTS",
     "EMITTER",
@@ -65,6 +85,8 @@ __all__ = [
     "FIRST_HIT",
     "MATERIAL",
     "MEDIUM",
+    "NO_JOB",
+    "NO_PRIMITIVE",
     "PATH_STATE",
     "PHASE",
     "QUADRIC",
@@ -76,16 +98,19 @@ __all__ = [
     "TEXTURE",
     "VOLUME",
     "Argument",
+    "BsdfFacts",
     "Macros",
     "PathField",
     "arguments",
     "counts_per_path",
     "enum",
     "first_hit_fields",
+    "kinds_text",
     "layout_text",
     "path_counts",
     "path_fields",
     "record_text",
+    "shared_text",
     "shows_weight",
     "slot_fields",
 ]

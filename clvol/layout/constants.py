@@ -5,17 +5,35 @@ from __future__ import annotations
 COUNTER_STRIDE = 16
 """Queue counters of a group, padded to a cache line."""
 
+NO_JOB = 0xFFFFFFFF
+"""Job of a slot that holds no path."""
+NO_PRIMITIVE = 0xFFFFFFFF
+"""Primitive of a hit where nothing is hit."""
+
+BRICK_CELLS = 8
+"""Interpolation cells of a volume's brick along an axis: a power of two."""
+BRICK_EDGE = BRICK_CELLS + 1
+"""Samples of a brick along an axis, so that all corners of its cells are its own."""
+BRICK_SAMPLES = BRICK_EDGE**3
+
 BVH_WIDTH = 8
 """Children of a node of the surfaces' hierarchy."""
 BVH_PACKET = 8
 """Primitives that a leaf holds at most, and that are tested together: the width of the device's vectors."""
 BVH_MOST_DEPTH = 48
 """Splits on the way to a leaf, at most: nodes that could become deeper are halved by number."""
+BVH_NODE_ROWS, BVH_PACKET_ROWS = 8, 10
+"""Rows of `BVH_WIDTH` and `BVH_PACKET` floats that a node and a leaf are made of (clvol.accel.bvh)."""
+BVH_LEAF, BVH_HAS_QUADRICS = 1 << 31, 1 << 30
+"""Marks in a child's reference; what remains is the number of the node, or of the leaf's packet."""
 BVH_STACK = (BVH_WIDTH - 1) * BVH_MOST_DEPTH + 1
 """Nodes that a traversal may keep waiting: siblings on every level."""
 
 RANDOMIZATIONS = 4
 """Independent randomisations that a pixel's low-discrepancy samples are dealt to in turn; a power of two."""
+
+COAT_ENTRIES = 64
+"""Entries of the table of what a rough plastic's coat lets through, over the cosine of incidence."""
 
 BLACKBODY_BINS = 1024
 """Entries of the table of blackbodies that is interpolated: within 1e-3 of the largest channel."""

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from clvol.layout.bsdfs import BSDFS
+
 
 def _record(*fields: tuple[str, str, int]) -> np.dtype[Any]:
     """A dtype of 4-byte scalars and small arrays, so that C and NumPy agree without padding rules."""
@@ -191,17 +193,7 @@ ENUMS = {
     "EMITTER": ("CONSTANT", "ENVMAP", "DIRECTIONAL", "POINT", "SPOT", "AREA"),
     "SURFACE": ("MESH", "SPHERE", "DISK", "CYLINDER"),
     "QUADRIC": ("SPHERE", "DISK", "CYLINDER"),
-    "MATERIAL": (
-        "NULL",
-        "DIFFUSE",
-        "DIELECTRIC",
-        "THIN_DIELECTRIC",
-        "ROUGH_DIELECTRIC",
-        "CONDUCTOR",
-        "ROUGH_CONDUCTOR",
-        "PLASTIC",
-        "ROUGH_PLASTIC",
-    ),
+    "MATERIAL": BSDFS,
     "DISTRIBUTION": ("BECKMANN", "GGX"),
     "TEXTURE": ("BITMAP", "CHECKERBOARD"),
     "WRAP": ("REPEAT", "MIRROR", "CLAMP"),
@@ -211,9 +203,6 @@ ENUMS = {
     "PROBABILITY": ("HISTORY", "AVERAGE", "MAX"),
     "CONTROL": ("NEXT_JOB", "JOB_LIMIT", "NON_FINITE", "DONE"),  # DONE: one counter per pass in the ring
 }
-
-BSDFS = ENUMS["MATERIAL"]
-"""Kinds of material; wrappers have none of their own."""
 
 
 def enum(family: str, name: str) -> int:

@@ -1,10 +1,6 @@
-"""OpenCL text of the layout: records, enums, the path's state and the kernels' arguments."""
+"""OpenCL text of the layout that goes by the scene: the path's state and the kernels' arguments."""
 
 from __future__ import annotations
-
-from typing import Any
-
-import numpy as np
 
 from clvol.layout.arguments import ARGUMENTS, arguments
 from clvol.layout.constants import BLACKBODY_BINS, BLACKBODY_MIDDLE_KELVIN, COUNTER_STRIDE
@@ -16,27 +12,13 @@ from clvol.layout.path_state import (
     path_fields,
     shows_weight,
 )
-from clvol.layout.records import ENUMS, RECORDS
-
-C_TYPES = {"f": "float", "i": "int", "u": "uint"}
-
-
-def record_text(name: str, dtype: np.dtype[Any]) -> str:
-    """C struct of a record dtype."""
-    lines = []
-    for field in dtype.names:
-        base, shape = dtype[field].base, dtype[field].shape
-        suffix = f"[{shape[0]}]" if shape else ""
-        lines.append(f"    {C_TYPES[base.kind]} {field}{suffix};")
-    return "typedef struct {\n" + "\n".join(lines) + f"\n}} {name};"
+from clvol.layout.records import ENUMS
+from clvol.layout.shared_text import C_TYPES
 
 
 def layout_text(macros: Macros) -> str:
-    """OpenCL text of every record, enum, path-state accessor and the stage argument list."""
-    parts = [record_text(name, dtype) for name, dtype in RECORDS.items()]
-    for family, names in ENUMS.items():
-        parts += [f"#define {family}_{name.upper()} {value}" for value, name in enumerate(names)]
-    parts += [f"#define QUEUE_COUNT {len(ENUMS['QUEUE'])}", f"#define COUNTER_STRIDE {COUNTER_STRIDE}u"]
+    """OpenCL text of every path-state accessor and the stage argument list: cl/core/scene.h."""
+    parts = [f"#define QUEUE_COUNT {len(ENUMS['QUEUE'])}", f"#define COUNTER_STRIDE {COUNTER_STRIDE}u"]
     parts += _scene_text(macros)
     for index, field in enumerate(path_fields(macros)):
         at = f"scene->state[{index}u * scene->slot_stride + slot]"

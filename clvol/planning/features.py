@@ -75,9 +75,7 @@ class Features:
     coloured_volumes: bool = False
     cubes: bool = False
     spheres: bool = False
-    isotropic: bool = False
-    hg: bool = False
-    rayleigh: bool = False
+    phases: tuple[str, ...] = ()
     blend: bool = False
     scattering: bool = False
     emitters: int = 0
@@ -160,9 +158,7 @@ class Features:
             coloured_volumes=any(channels_of(v) > 1 for v in volumes),
             cubes="cube" in bounds,
             spheres="sphere" in bounds,
-            isotropic="isotropic" in phases,
-            hg="hg" in phases,
-            rayleigh="rayleigh" in phases,
+            phases=tuple(sorted(kind.upper() for kind in phases)),
             blend=any(len(mixture) > 1 for mixture in lobes),
             scattering=any(_scatters(m) for m in media),
             **_surface_features(scene, found, surfaces, lamps),

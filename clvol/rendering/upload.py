@@ -11,6 +11,7 @@ import pyopencl as cl
 
 from clvol import layout
 from clvol.device.device import Device
+from clvol.layout import BRICK_SAMPLES
 from clvol.planning.config import KernelConfig
 from clvol.tables.blackbody import blackbody_table
 from clvol.tables.lights import LightTable, emitter_order, envmap_arrays, light_table
@@ -19,7 +20,6 @@ from clvol.tables.media import medium_table, phase_table, rows_3x4
 from clvol.tables.pixel_filter import filter_cdf
 from clvol.tables.prepare import PreparedScene
 from clvol.tables.sobol import block_table
-from clvol.volumes.bricks import BRICK_SAMPLES
 
 
 def upload_scene(

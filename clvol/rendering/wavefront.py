@@ -23,7 +23,6 @@ from clvol.planning.config import KernelConfig
 from clvol.rendering.film import Film
 
 log = logging.getLogger("clvol")
-NO_JOB = 0xFFFFFFFF
 _NEXT_JOB, _JOB_LIMIT, _NON_FINITE, _DONE = (layout.enum("CONTROL", n) for n in layout.ENUMS["CONTROL"])
 _MAX_ROUND_JOBS = 1 << 31
 _HARVEST_SECONDS = 2.0
@@ -118,7 +117,7 @@ class Wavefront:
         self.buffers = {name: self._buffer(size) for name, size in sizes.items()} | scene_buffers
         self.bytes = sum(sizes.values()) + sum(b.size for b in scene_buffers.values())
         state = np.zeros((len(self.fields), self.stride), np.uint32)
-        state[[f.name for f in self.fields].index("job")] = NO_JOB
+        state[[f.name for f in self.fields].index("job")] = layout.NO_JOB
         self._write("state", state)
         self._write("control", np.zeros(_DONE + self.pool.ring_passes, np.uint32))
         values = [
@@ -252,7 +251,7 @@ class Wavefront:
     def _abandon(self, passes: int) -> None:
         """Give up the paths in flight, and with them the passes that they belong to."""
         log.warning("dropped %d unfinished passes, whose paths did not end", passes)
-        fresh = {"job": NO_JOB, "leg": 0, "shadow_leg": 0}
+        fresh = {"job": layout.NO_JOB, "leg": 0, "shadow_leg": 0}
         for row, field in enumerate(self.fields):
             if field.name in fresh:
                 values = np.full(self.stride, fresh[field.name], np.uint32)

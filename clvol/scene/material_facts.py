@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from clvol.layout import BSDF_FACTS
 from clvol.scene.materials import (
     Bitmap,
     Bsdf,
@@ -31,8 +32,6 @@ _KINDS = {
     Plastic: "PLASTIC",
     RoughPlastic: "ROUGH_PLASTIC",
 }
-_TRANSMISSIVE = ("NULL", "DIELECTRIC", "THIN_DIELECTRIC", "ROUGH_DIELECTRIC")
-_SMOOTH = ("NULL", "DIELECTRIC", "THIN_DIELECTRIC", "CONDUCTOR")
 _COLORS = ("reflectance", "diffuse_reflectance", "specular_reflectance", "specular_transmittance")
 
 
@@ -64,13 +63,13 @@ def bsdf_sides(bsdf: Bsdf) -> tuple[Side, Side | None]:
     if isinstance(bsdf, TwoSided):
         front, back = bsdf_sides(bsdf.front)[0], bsdf_sides(bsdf.back)[0]
         for side in (front, back):
-            if side.opacities or side_kind(side.bsdf) in _TRANSMISSIVE:
+            if side.opacities or BSDF_FACTS[side_kind(side.bsdf)].transmits:
                 raise ValueError("a two-sided BSDF takes no BSDF that light passes")
         return front, back
     if isinstance(bsdf, Mask):
         return _masked(bsdf)
     side = Side(bsdf)
-    return side, side if side_kind(bsdf) in _TRANSMISSIVE else None
+    return side, side if BSDF_FACTS[side_kind(bsdf)].transmits else None
 
 
 def _masked(mask: Mask) -> tuple[Side, Side | None]:
@@ -131,7 +130,7 @@ def reflects(bsdf: Bsdf) -> bool:
 
 def samples_lights(bsdf: Bsdf) -> bool:
     """Whether it has more than delta lobes, so that light can be sampled for it."""
-    return not bsdf_kinds(bsdf) <= set(_SMOOTH)
+    return not all(BSDF_FACTS[kind].smooth for kind in bsdf_kinds(bsdf))
 
 
 def bsdf_textures(bsdf: Bsdf) -> list[Bitmap | Checkerboard]:

@@ -12,8 +12,8 @@ from functools import cache
 
 import numpy as np
 
-TRANSMITTANCE_ENTRIES = 64
-"""Cosines of incidence, evenly from 0 to 1, that a table holds (cl/bsdf/rough_plastic.h)."""
+from clvol.layout import COAT_ENTRIES
+
 MIN_ALPHA = 1e-4
 """Roughness below which a microfacet model is as good as smooth, and single precision ends."""
 _RADII, _ANGLES = 64, 32
@@ -75,8 +75,8 @@ def coat_shares(distribution: str, alpha: float, ior: float) -> tuple[np.ndarray
     azimuth = np.pi * (np.arange(_ANGLES) + 0.5) / _ANGLES
     cos_m = 1 / np.sqrt(1 + tan2)[:, None]
     tilt = np.sqrt(tan2)[:, None] * np.cos(azimuth)
-    shares = np.empty((2, TRANSMITTANCE_ENTRIES))
-    for n, mu in enumerate(np.linspace(0, 1, TRANSMITTANCE_ENTRIES)):
+    shares = np.empty((2, COAT_ENTRIES))
+    for n, mu in enumerate(np.linspace(0, 1, COAT_ENTRIES)):
         cosine = max(mu, 1e-6)
         facing = np.maximum(cosine + math.sqrt(1 - cosine**2) * tilt, 0)  # wi·m / m.z
         wi_m = np.minimum(facing * cos_m, 1)
@@ -94,6 +94,4 @@ def coat_table(distribution: str, alpha: float, ior: float) -> tuple[np.ndarray,
     """What a rough coat lets in, float32 (entries,), and its mean reflectance from inside."""
     _, transmittance = coat_shares(distribution, alpha, ior)
     inside, _ = coat_shares(distribution, alpha, 1 / ior)
-    return transmittance.astype(np.float32), float(
-        2 * np.mean(inside * np.linspace(0, 1, TRANSMITTANCE_ENTRIES))
-    )
+    return transmittance.astype(np.float32), float(2 * np.mean(inside * np.linspace(0, 1, COAT_ENTRIES)))

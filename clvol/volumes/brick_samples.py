@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.base.types import triple
-from clvol.volumes.sparse_places import BRICK_CELLS, SparsePlaces
+from clvol.layout import BRICK_CELLS, BRICK_EDGE, BRICK_SAMPLES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from clvol.volumes.grid import SparseGrid
+    from clvol.volumes.sparse_places import SparsePlaces
 
-BRICK_EDGE = BRICK_CELLS + 1
-BRICK_SAMPLES = BRICK_EDGE**3
 BOUND_CELLS = 4
 """Edge, in grid cells, of the finest extrema that are kept: half a brick."""
 CHUNK_BRICKS = 4096

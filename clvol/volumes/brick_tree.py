@@ -13,15 +13,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.errors import VolumeError
+from clvol.layout import BRICK_CELLS, BRICK_EDGE
 from clvol.volumes.brick_samples import (
-    BRICK_EDGE,
     gather_sparse,
     half_means,
     sparse_extrema,
     sparse_lattice,
 )
 from clvol.volumes.files import place
-from clvol.volumes.sparse_places import BRICK_CELLS
 from clvol.volumes.tree import (
     NODE_ENTRIES,
     Tier,

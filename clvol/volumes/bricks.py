@@ -16,10 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.base.types import triple
+from clvol.layout import BRICK_CELLS, BRICK_EDGE
 from clvol.volumes.brick_samples import (
     BOUND_CELLS,
-    BRICK_EDGE,
-    BRICK_SAMPLES,
     bricks_over,
     gather_sparse,
     half_extrema,
@@ -30,12 +29,12 @@ from clvol.volumes.brick_samples import (
 from clvol.volumes.brick_tree import BrickTree, build_tree, check_extent, is_scattered
 from clvol.volumes.files import place
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
-from clvol.volumes.sparse_places import BRICK_CELLS, SparsePlaces
+from clvol.volumes.sparse_places import SparsePlaces
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-__all__ = ["BOUND_CELLS", "BRICK_CELLS", "BRICK_SAMPLES", "BrickMap", "BrickTree", "build_bricks"]
+__all__ = ["BOUND_CELLS", "BrickMap", "BrickTree", "build_bricks"]
 
 
 @dataclass(frozen=True, eq=False)

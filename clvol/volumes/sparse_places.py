@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.errors import VolumeError
+from clvol.layout import BRICK_CELLS
 from clvol.volumes.files import place
 from clvol.volumes.tree import keys, rows_of, unique_places
 
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
     from clvol.volumes.grid import SparseGrid
 
-BRICK_CELLS = 8
 MOST_PLACES = 1 << 24
 """Bricks that a sparse grid may need: they would take 49 GB."""
 TABLE_PLACES = 1 << 18

@@ -11,7 +11,8 @@ from trees import leaves_of
 
 from clvol.accel.bounds import with_slack
 from clvol.accel.kdtree import build_kdtree, pack_maximum
-from clvol.volumes.bricks import BOUND_CELLS, BRICK_CELLS, build_bricks
+from clvol.layout import BRICK_CELLS
+from clvol.volumes.bricks import BOUND_CELLS, build_bricks
 from clvol.volumes.grid import DenseGrid, SparseGrid
 
 UNIT_BOX = np.array([[0.0, 0, 0], [1, 1, 1]])

@@ -85,7 +85,8 @@ def test_lines_are_numbered_as_in_their_files():
 def everything(**features):
     """A configuration for which no file is empty, with light that is gathered on walks."""
     found = {name: True for name, kind in Features.__annotations__.items() if kind == "bool"}
-    found |= {"media": 2, "volumes": 1, "surfaces": 1, "emitters": 1, "boundaries": 1, "bsdfs": layout.BSDFS}
+    found |= {"media": 2, "volumes": 1, "surfaces": 1, "emitters": 1, "boundaries": 1}
+    found |= {"bsdfs": layout.BSDFS, "phases": layout.ENUMS["PHASE"]}
     found["media_overlap"] = False
     choices = {"technique": "decomposition", "transmittance": "residual-ratio", "sampler": "sobol"}
     return KernelConfig(Features(**found | features), **choices, aov=tuple(registry.AOVS), top_trees=True)

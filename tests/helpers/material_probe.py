@@ -88,10 +88,7 @@ def source(kinds, channel=None, textures=True):
     defines |= {"CLVOL_SPECTRUM": 3 if channel is None else 1, "CLVOL_ONE_CHANNEL_PER_PATH": 1}
     buffers = ("const Material *materials", "const Texture *textures", "const float *texels")
     buffers = [f"__global {buffer}" for buffer in (*buffers, "const float *material_tables")]
-    lines = [layout.record_text(name, layout.RECORDS[name]) for name in ("Material", "Texture")]
-    for family in ("MATERIAL", "DISTRIBUTION", "TEXTURE", "WRAP"):
-        lines += [f"#define {family}_{n.upper()} {v}" for v, n in enumerate(layout.ENUMS[family])]
-    lines.append("typedef struct {" + "".join(f"{buffer}; " for buffer in buffers) + "} Scene;")
+    lines = ["typedef struct {" + "".join(f"{buffer}; " for buffer in buffers) + "} Scene;"]
     lines.append("#define SCENE " + ", ".join(f"{buffer}_" for buffer in buffers))
     lines.append(f"#define CHANNEL {channel or 0}")
     return programs.expand('#include "bsdf/bsdf.h"\n' + BODY, defines, {}, "\n".join(lines))

@@ -47,14 +47,12 @@ def ray_source(stack, triangles=True, quadrics=False, kernels=_KERNELS):
     flags |= {"CLVOL_HAS_TRIANGLES": int(triangles), "CLVOL_HAS_QUADRICS": int(quadrics)}
     flags |= {"CLVOL_BVH_STACK": stack}
     flags |= {"CLVOL_HAS_SURFACES": 1}
-    scene = [
-        *(f"#define QUADRIC_{name.upper()} {number}" for name, number in QUADRIC_KINDS.items()),
-        layout.record_text("Quadric", layout.QUADRIC),
+    scene = (
         "typedef struct { __global const float8 *bvh_nodes, *bvh_triangles; "
-        "__global const Quadric *quadrics; } Scene;",
-    ]
+        "__global const Quadric *quadrics; } Scene;"
+    )
     text = kernels.replace("ARGUMENTS", _ARGUMENTS).replace("BEGIN", _BEGIN)
-    return programs.expand('#include "geometry/bvh.h"\n' + text, flags, {}, "\n".join(scene))
+    return programs.expand('#include "geometry/bvh.h"\n' + text, flags, {}, scene)
 
 
 def directions(generator, count):

@@ -40,7 +40,6 @@ PRESENT = (
     "AREA_MESH",
     "AREA_SPHERE",
     "AREA_DISK",
-    "AREA_CYLINDER",
     "TRIANGLES",
     "QUADRICS",
     "SHADING_NORMALS",
@@ -128,14 +127,11 @@ def source(present=PRESENT, buffers=BUFFERS, kernels=KERNELS):
     macros = {f"CLVOL_{name}": value for name, value in DEFINES.items()}
     macros |= {f"CLVOL_HAS_{name}": int(name in present) for name in (*PRESENT, *ABSENT)}
     macros["CLVOL_HAS_SURFACES"] = macros["CLVOL_HAS_AREA"]
-    text = [layout.record_text(name, dtype) for name, dtype in layout.RECORDS.items()]
-    for family, names in layout.ENUMS.items():
-        text += [f"#define {family}_{name.upper()} {value}" for value, name in enumerate(names)]
     tree = dict.fromkeys(("bvh_nodes", "bvh_triangles"), "float8")
     fields = (f"__global const {kind} *{name};" for name, kind in (buffers | tree).items())
-    text.append("typedef struct {" + " ".join(fields) + "} Scene;")
+    scene = "typedef struct {" + " ".join(fields) + "} Scene;"
     headers = "".join(f'#include "{name}.h"\n' for name in ("core/random", "emitter/area", "emitter/emitter"))
-    return programs.expand(headers + kernels, macros, {}, "\n".join(text))
+    return programs.expand(headers + kernels, macros, {}, scene)
 
 
 def rows(matrix):
@@ -389,7 +385,7 @@ ALONE = {  # the buffers that a scene has with one kind of light
     "AREA_MESH AREA TRIANGLES": "shapes faces vertices light_faces light_cdf",
     "AREA_SPHERE AREA QUADRICS": "shapes quadrics",
     "AREA_DISK AREA QUADRICS TRIANGLES": "shapes quadrics faces vertices",
-    "AREA_CYLINDER AREA QUADRICS TRIANGLES SHADING_NORMALS": "shapes quadrics faces vertices normals",
+    "AREA QUADRICS TRIANGLES SHADING_NORMALS": "shapes quadrics faces vertices normals",
 }
 
 

@@ -145,7 +145,7 @@ def test_the_henyey_greenstein_pdf_is_the_formula_and_integrates_to_one(hg_probe
     x, w = (a.ravel() for a in gauss(edges[:-1], edges[1:], 8))
     x32, out, g32 = x.astype(np.float32), np.zeros(x.size, np.float32), float(np.float32(g))
     a = abs(g32)
-    hg_probe.run(["phase/phase.h"], f"out0[i] = hg_pdf({a!r}f, in0[i]);", [out], [x32])
+    hg_probe.run(["phase/phase.h"], f"out0[i] = hg_density({a!r}f, in0[i]);", [out], [x32])
     exact = (1 - a * a) / (4 * np.pi * ((1 - a) ** 2 + 2 * a * x32.astype(float)) ** 1.5)
     assert np.abs(out / exact - 1).max() < 2e-6
     assert abs(2 * np.pi * (out * w).sum() - 1) < 1e-5
@@ -169,7 +169,7 @@ def test_rayleigh_directions_are_inverted_to_float_precision_from_both_poles(hg_
     u = np.unique(np.concatenate([small, 1 - small[small > 2.0**-24], np.linspace(0, 1, 1001)[1:-1]]))
     u = u.astype(np.float32)[u.astype(np.float32) < 1]
     out = np.zeros((u.size, 2), np.float32)
-    hg_probe.run(["phase/phase.h"], "vstore2(rayleigh_sample(in0[i]), i, out0);", [out], [u])
+    hg_probe.run(["phase/phase.h"], "vstore2(rayleigh_cosine(in0[i]), i, out0);", [out], [u])
     nearer = np.minimum(u.astype(float), 1 - u.astype(float))
     x = nearer * 4 / 3
     for _ in range(50):

@@ -5,7 +5,6 @@ import pytest
 from material_probe import read
 
 from clvol import layout
-from clvol.device.programs import kernel_source
 from clvol.errors import SceneError
 from clvol.scene import material_facts as facts
 from clvol.scene.materials import (
@@ -208,11 +207,6 @@ def test_numbers_of_a_record():
     assert np.isclose(plastic["specular_weight"], 0.8 / 1.2) and second["specular_weight"] == 0.5
     assert first["table"] == 0 and second["table"] == 64 and table.tables.shape == (128,)
     assert (np.diff(table.tables[:64]) > -1e-3).all() and 0 < table.tables[0] < table.tables[63] < 1
-
-
-def test_shared_numbers_of_device_and_host():
-    text = kernel_source("bsdf/rough_plastic.h")
-    assert "TRANSMITTANCE_ENTRIES 64" in text
 
 
 def test_records_that_no_loader_makes_are_refused():

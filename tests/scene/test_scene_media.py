@@ -269,11 +269,11 @@ def test_rayleigh_and_blended_phase_functions():
 
 def test_features_tell_which_phase_functions_there_are():
     found = features_of(phase=BLEND)
-    assert (found.isotropic, found.hg, found.rayleigh, found.blend) == (False, True, True, True)
+    assert (found.phases, found.blend) == (("HG", "RAYLEIGH"), True)
     found = features_of(phase=BLEND | {"weight": 1.0})  # only the second
-    assert (found.isotropic, found.hg, found.rayleigh, found.blend) == (False, False, True, False)
+    assert (found.phases, found.blend) == (("RAYLEIGH",), False)
     found = features_of(phase=BLEND | {"a": {"type": "hg", "g": 0.5}})  # twice the same
-    assert (found.hg, found.blend) == (True, False)
+    assert (found.phases, found.blend) == (("HG",), False)
 
 
 def many_phases(levels):

@@ -1,0 +1,6 @@
+/* What host and device share whatever the scene: records, numbered kinds, numbers.  The text comes from clvol/layout. */
+#ifndef CLVOL_CORE_SHARED_H
+#define CLVOL_CORE_SHARED_H
+#include CLVOL_SHARED_HEADER
+
+#endif

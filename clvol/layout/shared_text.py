@@ -1,0 +1,72 @@
+"""OpenCL text of what host and device share whatever the scene: records, numbered kinds, numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from clvol.layout import constants
+from clvol.layout.bsdfs import BSDF_FACTS
+from clvol.layout.records import ENUMS, RECORDS
+
+C_TYPES = {"f": "float", "i": "int", "u": "uint"}
+
+_NUMBERS = (
+    "NO_JOB",
+    "NO_PRIMITIVE",
+    "BRICK_CELLS",
+    "BRICK_EDGE",
+    "BRICK_SAMPLES",
+    "BVH_NODE_ROWS",
+    "BVH_PACKET_ROWS",
+    "BVH_PACKET",
+    "BVH_LEAF",
+    "BVH_HAS_QUADRICS",
+    "COAT_ENTRIES",
+)
+"""Names in `clvol.layout.constants`, which kernels know by the same."""
+
+
+def record_text(name: str, dtype: np.dtype[Any]) -> str:
+    """C struct of a record dtype."""
+    lines = []
+    for field in dtype.names:
+        base, shape = dtype[field].base, dtype[field].shape
+        suffix = f"[{shape[0]}]" if shape else ""
+        lines.append(f"    {C_TYPES[base.kind]} {field}{suffix};")
+    return "typedef struct {\n" + "\n".join(lines) + f"\n}} {name};"
+
+
+@cache
+def shared_text() -> str:
+    """Every record, enum and number: cl/core/shared.h."""
+    parts = [record_text(name, dtype) for name, dtype in RECORDS.items()]
+    for family, names in ENUMS.items():
+        parts += [f"#define {family}_{name.upper()} {value}" for value, name in enumerate(names)]
+    for name in _NUMBERS:
+        value = getattr(constants, name)
+        parts.append(f"#define {name} {value}" if value < 1 << 16 else f"#define {name} 0x{value:08X}u")
+    return "\n".join(parts) + "\n"
+
+
+@cache
+def kinds_text(family: str) -> str:
+    """How many of "BSDF" or "PHASE" a scene has, and facts of a material: cl/bsdf/kinds.h, cl/phase/kinds.h.
+
+    In units of these only: macros that occur in a unit decide what is built again.
+    """
+    names = tuple(BSDF_FACTS) if family == "BSDF" else ENUMS[family]
+    parts = [f"#define {family}_KINDS ({' + '.join(f'CLVOL_{family}_{name}' for name in names)})"]
+    if family == "BSDF":
+        smooth = (name for name, facts in BSDF_FACTS.items() if facts.smooth)
+        transmits = (name for name, facts in BSDF_FACTS.items() if facts.transmits)
+        parts += [f"#define IS_SMOOTH(material) {_any_of(smooth)}"]
+        parts += [f"#define IS_TRANSMISSIVE(material) {_any_of(transmits)}"]
+    return "\n".join(parts) + "\n"
+
+
+def _any_of(names: Iterable[str]) -> str:
+    return "(" + " || ".join(f"IS_BSDF(material, {name})" for name in names) + ")"
