@@ -80,7 +80,8 @@ class _Means(NamedTuple):
     @property
     def unit(self) -> np.ndarray:
         """What the largest sample adds to a region's mean."""
-        return self.largest / (self.pixels * self.rounds)
+        unit: np.ndarray = self.largest / (self.pixels * self.rounds)
+        return unit
 
 
 class _Tests(NamedTuple):
@@ -103,7 +104,7 @@ def agreement(
     b: np.ndarray,
     tile: int = 8,
     alpha: float = 1e-4,
-    spp: tuple[int, int] | None = None,
+    spp: tuple[float, float] | None = None,
     largest: tuple[float, float] = (0.0, 0.0),
 ) -> Agreement:
     """Test whether two stacks of renders have the same expectation.
@@ -174,7 +175,7 @@ def _means(stack: np.ndarray, edge: int, largest: float) -> _Means:
     return _Means(found.mean, found.variance, doubt, rounds, found.pixels, np.maximum(excess, largest))
 
 
-def _welch(a: _Means, b: _Means, spp: tuple[int, int] | None) -> _Tests:
+def _welch(a: _Means, b: _Means, spp: tuple[float, float] | None) -> _Tests:
     """Two-sided tests of a = b in every region."""
     variance = a.variance / a.rounds + b.variance / b.rounds
     doubt = a.doubt / a.rounds**2 + b.doubt / b.rounds**2
@@ -204,7 +205,8 @@ def _missed(dark: _Means, bright: _Means) -> np.ndarray:
     """
     lacking, unit = bright.mean - dark.mean, np.broadcast_to(dark.unit, dark.mean.shape)
     known = (lacking > 0) & (unit > 0)
-    return np.exp(-np.divide(lacking, unit, out=np.full_like(lacking, math.inf), where=known))
+    missed: np.ndarray = np.exp(-np.divide(lacking, unit, out=np.full_like(lacking, math.inf), where=known))
+    return missed
 
 
 def _smallest_bias(image: _Tests, level: float) -> float:

@@ -62,7 +62,7 @@ class Candidate:
     @property
     def variance(self) -> np.ndarray:
         """Of a round, the mean over channels, between rounds; float64 (pixels,)."""
-        return round_variance(self.images).ravel()
+        return round_variance(np.asarray(self.images)).ravel()
 
     def since(self, first: int) -> Candidate:
         """With the rounds from the given one on alone."""
@@ -169,6 +169,8 @@ def precomputation(seconds: float, render_seconds: float, rounds: float | None, 
     """
     if rounds is not None:
         return seconds / rounds
+    if limit is None:
+        raise ValueError("a render ends by its rounds or by its seconds")
     left = max(limit - seconds, limit / _LATE)
     return render_seconds * (limit / left - 1)
 

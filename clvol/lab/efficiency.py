@@ -81,13 +81,14 @@ class Work:
         cost = self.overhead + self.rounds / fewer * (self.cost.sum() - self.cost)
         return _log_product(errors, cost)
 
-    def _errors(self, one: np.ndarray, bias: np.ndarray) -> np.ndarray:
+    def _errors(self, one: np.ndarray | float, bias: np.ndarray | float) -> np.ndarray:
         """MSE of the mean of all rounds, from that of one round and the squared bias."""
-        bias = np.maximum(bias, 0.0) if self.biased else 0.0
-        return bias + (one - bias) / self.rounds
+        kept = np.maximum(bias, 0.0) if self.biased else 0.0
+        errors: np.ndarray = np.asarray(kept + (one - kept) / self.rounds)
+        return errors
 
 
-def _log_product(error: np.ndarray, cost: np.ndarray) -> np.ndarray:
+def _log_product(error: np.ndarray | float, cost: np.ndarray | float) -> np.ndarray:
     """log(error · cost), nan where either is not positive."""
     known = (np.asarray(error) > 0) & (np.asarray(cost) > 0)
     return np.log(np.where(known, error * cost, np.nan))
@@ -148,7 +149,8 @@ def convergence_bands(products: np.ndarray, resamples: int = 1000, seed: int = 1
     one = times @ diagonal / count
     pairs = np.einsum("ri,ij,rj->r", times, products, times) - times**2 @ diagonal
     bias = pairs / (count**2 - (times**2).sum(axis=1))
-    return bias[:, None] + (one - bias)[:, None] / np.arange(1, count + 1)
+    curves: np.ndarray = bias[:, None] + (one - bias)[:, None] / np.arange(1, count + 1)
+    return curves
 
 
 def pair_error(pairs: np.ndarray) -> tuple[float, float]:

@@ -8,13 +8,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from clvol.lab.agreement import Agreement, agreement
-from clvol.lab.combinations import Names
 from clvol.lab.statistics import round_variance
 from clvol.rendering.outcome import LARGE_WEIGHT
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from clvol.lab.combinations import Names
 
 NOISY = 4.0
 """A combination that has so many times the median variance is not what others are compared with."""
@@ -146,21 +151,25 @@ def judge(tested: list[Tested], alpha: float) -> Judgement:
     Each test is of level alpha over the number of those left (Holm); the first of them all accuse a sound
     combination with probability alpha together.
     """
-    left, struck, guilty, contrasts = list(tested), [], [], []
+    left = list(tested)
+    struck: list[Tested] = []
+    guilty: list[Contrast] = []
+    contrasts: list[Contrast] = []
     while len(left) > 1:
         splits = _splits(left)
         level = alpha / (len(left) + len(splits))
         for one in left:
             one.agreement = _against(one, left, level)
         contrasts = [Contrast(a, b, _contrast(a.members, b.members, level)) for a, b in splits]
-        worst = min([*left, *contrasts], key=_badness)
-        if worst.agreement.agrees:
+        worst, found = min(_found([*left, *contrasts]), key=_badness)
+        if found.agrees:
             break
+        accused: Sequence[Tested]
         if isinstance(worst, Contrast):
             guilty.append(worst)
             accused = worst.accused
             for one in accused:
-                one.agreement = worst.agreement
+                one.agreement = found
         else:
             accused = left if len(left) == 2 else [worst]  # of two, nobody can say which
         struck += accused
@@ -180,9 +189,14 @@ def judge(tested: list[Tested], alpha: float) -> Judgement:
     return Judgement(tuple(c for c in guilty if not all(one.agrees for one in c.accused)), tuple(limits))
 
 
-def _badness(one: Tested | Contrast) -> tuple[float, float]:
+def _found(compared: Sequence[Tested | Contrast]) -> list[tuple[Tested | Contrast, Agreement]]:
+    """Those that were compared with others, each with what that found."""
+    return [(one, one.agreement) for one in compared if one.agreement is not None]
+
+
+def _badness(found: tuple[Tested | Contrast, Agreement]) -> tuple[float, float]:
     """Smallest first: the p-value, and the distance of the means where p is 0 of several."""
-    return one.agreement.p, -one.agreement.deviation
+    return found[1].p, -found[1].deviation
 
 
 def _splits(left: list[Tested]) -> list[tuple[Side, Side]]:
@@ -196,14 +210,15 @@ def _splits(left: list[Tested]) -> list[tuple[Side, Side]]:
         choices.setdefault(users, []).append(f"{family} {name}")
     everyone = frozenset(range(len(left)))
     splits = dict.fromkeys(frozenset({users, everyone - users}) for users in choices)
-    return [
-        tuple(
+    found = []
+    for split in splits:
+        smaller, larger = (
             Side(tuple(left[n] for n in sorted(side)), tuple(choices.get(side, ())))
             for side in sorted(split, key=lambda side: (len(side), min(side, default=0)))
         )
-        for split in splits
-        if min(map(len, split)) > 1
-    ]
+        if len(smaller.members) > 1:
+            found.append((smaller, larger))
+    return found
 
 
 def _against(one: Tested, everyone: list[Tested], level: float) -> Agreement:
@@ -225,7 +240,7 @@ def _contrast(users: tuple[Tested, ...], others: tuple[Tested, ...], level: floa
         calm = [one for one in calm if one.found * math.log(1 / level) <= UNSURE * light] or calm
         return [one for one in calm if not one.heavy] or calm or list(side)
 
-    sides = [quiet(side) for side in (users, others)]
-    stacks = [np.concatenate([one.images for one in side]) for side in sides]
-    found = tuple(max(one.found for one in side) for side in sides)
-    return agreement(*stacks, alpha=level, spp=(1, 1), largest=found)
+    a, b = quiet(users), quiet(others)
+    left, right = (np.concatenate([one.images for one in side]) for side in (a, b))
+    largest = (max(one.found for one in a), max(one.found for one in b))
+    return agreement(left, right, alpha=level, spp=(1, 1), largest=largest)

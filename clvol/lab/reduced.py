@@ -24,6 +24,6 @@ def _scaled(film: Film, factor: float) -> Film:
     if film.crop is not None:
         x, y = (int(factor * start) for start in film.crop[:2])
         x, y = min(x, width - 1), min(y, height - 1)
-        size = (max(1, round(factor * extent)) for extent in film.crop[2:])
-        crop = (x, y, *(min(s, room) for s, room in zip(size, (width - x, height - y), strict=True)))
+        across, down = (max(1, round(factor * extent)) for extent in film.crop[2:])
+        crop = (x, y, min(across, width - x), min(down, height - y))
     return replace(film, width=width, height=height, crop=crop)

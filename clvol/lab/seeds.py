@@ -20,10 +20,9 @@ def independent_seeds(seed: int, purpose: str) -> Iterator[int]:
 
 def seeds_from(seed: int, taken: tuple[int, int] | None = None) -> Iterator[int]:
     """64-bit seeds counting up from `seed`, without those taken, from the first to the last."""
+    counted: Iterator[int] = itertools.count(seed)
     if taken is not None and seed <= taken[1]:
         seed = max(seed, taken[1] + 1) if seed >= taken[0] else seed
         before = itertools.takewhile(lambda n: n < taken[0], itertools.count(seed))
         counted = itertools.chain(before, itertools.count(max(seed, taken[1] + 1)))
-    else:
-        counted = itertools.count(seed)
     return (n % 2**64 for n in counted)

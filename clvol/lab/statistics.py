@@ -36,7 +36,8 @@ def round_variance(images: np.ndarray) -> np.ndarray:
 
     images : float (rounds, height, width, channels), at least 2 rounds; returns float64 (height, width).
     """
-    return np.var(images, axis=0, ddof=1, dtype=np.float64).mean(axis=-1)
+    variance: np.ndarray = np.var(images, axis=0, ddof=1, dtype=np.float64).mean(axis=-1)
+    return variance
 
 
 def region_sums(plane: np.ndarray, edge: int) -> np.ndarray:

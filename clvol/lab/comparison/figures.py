@@ -135,7 +135,8 @@ class Figures:
     @property
     def image(self) -> np.ndarray:
         """Mean of all rounds, float64 (height, width, 3)."""
-        return self.measured.images.mean(axis=0, dtype=np.float64)
+        mean: np.ndarray = self.measured.images.mean(axis=0, dtype=np.float64)
+        return mean
 
 
 def compute_figures(measured: list[Measured], reference: Reference, baseline: str) -> tuple[Figures, ...]:

@@ -210,7 +210,7 @@ def _samples(wanted: float, lineup: Lineup) -> int:
     Where sampler sobol takes part, a power of two from 4 on for all: others cost it some of its gain.
     """
     if any(uses_sobol(trial) for trial in lineup.trials.values()):
-        below = 2 ** max(2, math.floor(math.log2(max(wanted, 1.0))))
+        below = 1 << max(2, math.floor(math.log2(max(wanted, 1.0))))
         return below if wanted < 1.5 * below else 2 * below
     return max(1, round(wanted))
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, SKY, ORANGE, "#7a5195", "#555555")
 DASHES = ("-", "--", "-.", ":")
-STYLE = {
+STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 9,
     "axes.spines.top": False,
@@ -181,17 +181,20 @@ def error_pictures(figures: Figures, findings: Findings, scales: tuple[float, fl
 
 def _level(findings: Findings) -> np.ndarray:
     """What errors are relative to, (height, width): sqrt(F² + (DARK · mean F)²)."""
-    return 1.0 / np.sqrt(relative_weight(findings.reference.image.mean(axis=-1)))
+    level: np.ndarray = 1.0 / np.sqrt(relative_weight(findings.reference.image.mean(axis=-1)))
+    return level
 
 
 def _spread(figures: Figures, findings: Findings) -> np.ndarray:
     images, truth = figures.measured.images, findings.reference
     squares = sum((image - truth.image) ** 2 for image in images) / len(images) - truth.variance
-    return np.sqrt(np.maximum(squares, 0.0).mean(axis=-1)) / _level(findings)
+    error: np.ndarray = np.sqrt(np.maximum(squares, 0.0).mean(axis=-1)) / _level(findings)
+    return error
 
 
 def _difference(figures: Figures, findings: Findings) -> np.ndarray:
-    return (figures.image - findings.reference.image).mean(axis=-1) / _level(findings)
+    error: np.ndarray = (figures.image - findings.reference.image).mean(axis=-1) / _level(findings)
+    return error
 
 
 def _pixels(pixels: np.ndarray) -> bytes:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import logging
+import math
 import os
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -66,7 +68,7 @@ class Reference:
         if squares.sum() == 0:
             return 0.0
         spread = float(squares.std(ddof=1) / squares.mean()) * float(self.variance.mean())
-        return max(spread, float(pixels)) * np.sqrt(1 + 1 / count)
+        return max(spread, float(pixels)) * math.sqrt(1 + 1 / count)
 
 
 def read_reference(path: str | os.PathLike[str], scene: Scene) -> Reference:
@@ -127,7 +129,7 @@ def _read_planes(where: str) -> tuple[dict[str, np.ndarray], dict[str, object]]:
     return {name: stored.pixels[..., n] for n, name in enumerate(stored.channels)}, stored.metadata
 
 
-def _count(value: object) -> int | None:
+def _count(value: Any) -> int | None:
     """A number of at least 1 out of a file's metadata, which anybody may have written; None for all else."""
     try:
         return count if (count := int(value)) >= 1 else None
@@ -167,4 +169,5 @@ def _stand_ins(image: np.ndarray, variance: np.ndarray, dof: int) -> np.ndarray:
     noise = np.random.default_rng(1).standard_normal((count, *image.shape[:2], 1))
     noise -= noise.mean(axis=0)
     noise = noise / noise.std(axis=0, ddof=1) * np.sqrt(variance * count)
-    return (image + noise).astype(np.float32)
+    rounds: np.ndarray = image + noise
+    return rounds.astype(np.float32)

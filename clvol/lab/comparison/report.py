@@ -154,7 +154,7 @@ def _reference_metadata(findings: Findings) -> dict[str, Any]:
 def as_json(findings: Findings) -> dict[str, Any]:
     """Everything in report.json but the names of files; what is not finite is None."""
     reference = findings.reference
-    return _plain(
+    plain: dict[str, Any] = _plain(
         {
             "kind": KIND,
             "made": findings.about,
@@ -173,6 +173,7 @@ def as_json(findings: Findings) -> dict[str, Any]:
             "combinations": [_combination(f) for f in findings.figures],
         }
     )
+    return plain
 
 
 def _combination(f: Figures) -> dict[str, Any]:

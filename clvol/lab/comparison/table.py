@@ -84,9 +84,9 @@ def text_table(findings: Findings, width: int | None = None) -> str:
         table.add_column(head, justify="left" if number == 0 else "right")
     for row in rows:
         table.add_row(*map(Text, row))
-    console = Console(file=io.StringIO(), width=10_000, color_system=None)
-    console.print(table)
-    lines = [line.rstrip() for line in console.file.getvalue().splitlines() if line.strip()]
+    text = io.StringIO()
+    Console(file=text, width=10_000, color_system=None).print(table)
+    lines = [line.rstrip() for line in text.getvalue().splitlines() if line.strip()]
     width = _terminal_width() if width is None else width
     if width and max(map(len, lines)) > width:
         lines = [line for row in rows for line in _paragraph(heads, row, width)]

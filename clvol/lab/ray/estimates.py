@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,15 +21,15 @@ HEADROOM = 1.3
 """Panels leave room for their legends."""
 
 
-def estimates(figure: Figure, place: SubplotSpec, view: WatchedRay, shared: Axes) -> None:
+def estimates(figure: Figure, place: SubplotSpec, view: WatchedRay, shared: Axes | None) -> None:
     """Free paths and weights of the techniques, running estimates of the transmittances."""
     techniques = [w for w in view.watched if w.family == "technique"]
     shadows = [w for w in view.watched if w.family == "transmittance"]
     draws = [(_free_paths, techniques), (_weights, techniques)] if techniques else []
     draws.append((_transmittance, shadows))
     cells = place.subgridspec(len(draws), 1, hspace=0.1, height_ratios=[1.0, 0.85, 1.3][-len(draws) :])
-    for cell, (panel, watched) in zip(cells, draws, strict=True):
-        axes = figure.add_subplot(cell, sharex=shared)
+    for row, (panel, watched) in enumerate(draws):
+        axes = figure.add_subplot(cells[row], sharex=shared)
         panel(axes, view, watched)
         axes.set_xlabel(DISTANCE)
         axes.spines[["top", "right"]].set_visible(False)
@@ -55,7 +55,7 @@ def _free_paths(axes: Axes, view: WatchedRay, watched: list[Watched]) -> None:
             alpha=0.25,
             lw=0,
         )
-        how = {"color": look, "ls": style(view, one), "label": one.label}
+        how: dict[str, Any] = {"color": look, "ls": style(view, one), "label": one.label}
         axes.stairs(density, start + edges, baseline=None, lw=1.4, zorder=3, **how)
     axes.set_title(
         f"Free paths: {len(watched[0].outcomes):,} walks each, weighted, ± 2 standard errors",
@@ -116,7 +116,7 @@ def _transmittance(axes: Axes, view: WatchedRay, watched: list[Watched]) -> None
                 break  # nothing is known before its end
             label = None if number else f"{one.label}, {len(one.walks)} walks"
             running = one.running_estimate(walk, edges, channel)
-            how = {"color": look, "ls": style(view, one), "label": label}
+            how: dict[str, Any] = {"color": look, "ls": style(view, one), "label": label}
             axes.plot(start + edges, running, lw=1.0, alpha=0.75, **how)
         axes.errorbar(
             [start + view.window[1]],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from clvol.errors import printable
 from clvol.lab.ray.estimates import estimates
@@ -14,14 +15,14 @@ from clvol.lab.ray.watched import CHANNEL_NAMES, WatchedRay
 def draw(view: WatchedRay) -> Figure:
     """The whole figure, for a slide: 16 inches wide, as high as what is watched needs."""
     rows = len(view.watched)
-    figure = Figure(figsize=(16, max(9.0, 1.75 * rows + 1.9)), layout="constrained")
-    figure.get_layout_engine().set(w_pad=0.06, h_pad=0.05, wspace=0.03, hspace=0.0)
-    left, right = figure.add_gridspec(1, 2, width_ratios=(1.15, 1.0))
-    panels = left.subgridspec(rows, 1, hspace=0.1)
+    layout = ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.05, wspace=0.03, hspace=0.0)
+    figure = Figure(figsize=(16, max(9.0, 1.75 * rows + 1.9)), layout=layout)
+    columns = figure.add_gridspec(1, 2, width_ratios=(1.15, 1.0))
+    panels = columns[0].subgridspec(rows, 1, hspace=0.1)
     first = None
     for row, watched in enumerate(view.watched):
         first = walks_panel(figure, panels[row], view, watched, first, row == rows - 1)
-    estimates(figure, right, view, first)
+    estimates(figure, columns[1], view, first)
     figure.suptitle(_title(view), fontsize=15, fontweight="bold", parse_math=False)
     figure.legend(
         handles=symbols(view),
