@@ -7,16 +7,20 @@ and a picture too dark, and would look the better for it: what it lacks beside t
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.device.device import Device
 from clvol.lab.agreement import ROUNDING
 from clvol.lab.statistics import Interval, bootstrap, regions, round_variance
-from clvol.lab.trials import Trial
 from clvol.rendering.outcome import LARGE_WEIGHT, make_result
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from clvol.device.device import Device
+    from clvol.lab.trials import Trial
 
 DEVIATIONS, TILE_DEVIATIONS = 3.0, 4.0
 """By so many standard errors a picture's mean, and one of its many tiles, may be darker than another's."""

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from clvol.scene.records import Film, Scene
+if TYPE_CHECKING:
+    from clvol.scene.records import Film, Scene
 
 
 def reduced(scene: Scene, pixels: int) -> Scene:

@@ -38,6 +38,7 @@ class Bar:
         return self
 
     def __call__(self, done: float, expected: float, text: str) -> None:
+        """Show how far it is; seconds expected are 0 while nobody knows."""
         left = ""
         if expected:
             if self._began is None:  # the pace of opening says nothing about that of rendering

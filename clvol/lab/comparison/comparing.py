@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import platform
-from collections.abc import Iterable
 from contextlib import nullcontext
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,6 +26,10 @@ from clvol.rendering.session import MAX_SAMPLES
 from clvol.scene.digest import scene_digest
 from clvol.scene.records import Scene
 from clvol.version import __version__
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterable
 
 DEFAULT_SECONDS = 10.0
 MOST_ROUNDS = 10_000

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from clvol.lab.agreement import Agreement, agreement
-from clvol.lab.comparison.measure import Measured
-from clvol.lab.comparison.reference import Reference
 from clvol.lab.comparison.shorter import render_slope
 from clvol.lab.efficiency import (
     Work,
@@ -21,6 +20,10 @@ from clvol.lab.efficiency import (
     largest_share,
 )
 from clvol.lab.statistics import Interval, holm
+
+if TYPE_CHECKING:
+    from clvol.lab.comparison.measure import Measured
+    from clvol.lab.comparison.reference import Reference
 
 LEVEL = 0.05
 """Probability that any of the efficiencies of one kind is called significantly different though it is not."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from clvol.lab.comparison.figures import Figures
-from clvol.lab.comparison.reference import Reference
+if TYPE_CHECKING:
+    from clvol.lab.comparison.figures import Figures
+    from clvol.lab.comparison.reference import Reference
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,12 +5,15 @@ from __future__ import annotations
 import base64
 from html import escape
 from pathlib import PurePath
+from typing import TYPE_CHECKING
 
 from clvol.lab.comparison.figures import ALPHA, DARK
-from clvol.lab.comparison.findings import Findings
 from clvol.lab.comparison.plots import error_pictures, error_scales, picture
 from clvol.lab.comparison.table import table_rows
 from clvol.lab.comparison.words import sentences
+
+if TYPE_CHECKING:
+    from clvol.lab.comparison.findings import Findings
 
 CSS = """
 :root { --ink: #22272e; --soft: #68707c; --line: #e3e6ea; --wash: #f7f8fa; --accent: #0072b2; }

@@ -10,19 +10,21 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from clvol.base.interrupts import interruptible
-from clvol.lab.comparison.combine import Lineup
 from clvol.lab.comparison.reference import Reference
 from clvol.lab.comparison.shorter import shorter_spp
 from clvol.lab.efficiency import LEAST_ROUNDS
 from clvol.lab.quiet import log_filter
 from clvol.lab.seeds import seeds_from
 from clvol.lab.trials import Trial, rounds
-from clvol.picture.result import Result
+
+if TYPE_CHECKING:
+    from clvol.lab.comparison.combine import Lineup
+    from clvol.picture.result import Result
 
 REFERENCE_SAMPLES = 10
 """The reference has about so many times the samples that its combination has in all rounds together."""

@@ -10,13 +10,14 @@ import numpy as np
 
 from clvol.lab.colours import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
 from clvol.lab.comparison.figures import COSTS, Figures, relative_weight
-from clvol.lab.comparison.findings import Findings
 from clvol.picture.image_io import MAGENTA, tone_map
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
+
+    from clvol.lab.comparison.findings import Findings
 
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, SKY, ORANGE, "#7a5195", "#555555")
 DASHES = ("-", "--", "-.", ":")

@@ -6,7 +6,7 @@ import logging
 import math
 import os
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,9 @@ from clvol.base.files import other_kind
 from clvol.base.image_reading import UnreadableError, read_stored
 from clvol.errors import OptionError
 from clvol.scene.digest import scene_digest
-from clvol.scene.records import Scene
+
+if TYPE_CHECKING:
+    from clvol.scene.records import Scene
 
 log = logging.getLogger("clvol")
 _MANY = 15

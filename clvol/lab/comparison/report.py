@@ -26,20 +26,23 @@ import json
 import os
 import secrets
 import shutil
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from clvol.base.extras import need_matplotlib
 from clvol.base.output_files import check_room, kept_elsewhere, new_file, real, sync_folder
 from clvol.errors import OptionError
-from clvol.lab.comparison.figures import Curve, Figures
-from clvol.lab.comparison.findings import Findings
 from clvol.lab.comparison.html import html_report
 from clvol.lab.comparison.plots import plots
 from clvol.lab.comparison.words import sentences
 from clvol.picture import image_io
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from clvol.lab.comparison.figures import Curve, Figures
+    from clvol.lab.comparison.findings import Findings
 
 KIND = "clvol compare"
 _LEAST_BYTES = 2**18

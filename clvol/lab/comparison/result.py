@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-import os
+from typing import TYPE_CHECKING
 
 from clvol.lab.comparison.findings import Findings
 from clvol.lab.comparison.report import write_report
 from clvol.lab.comparison.table import text_table
 from clvol.lab.comparison.words import sentences
+
+if TYPE_CHECKING:
+    import os
 
 
 class Comparison(Findings):

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import stdtrit
 
 from clvol.lab.statistics import Interval
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 _FACTOR, _STEPS, _LEAST = 4, 2, 4
 

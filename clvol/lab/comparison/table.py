@@ -8,10 +8,13 @@ import os
 import shutil
 import sys
 import textwrap
+from typing import TYPE_CHECKING
 
 from clvol.lab.comparison.figures import COSTS, Figures
-from clvol.lab.comparison.findings import Findings
 from clvol.lab.comparison.words import times
+
+if TYPE_CHECKING:
+    from clvol.lab.comparison.findings import Findings
 
 VERDICTS = {
     (False, True): "no bias seen",

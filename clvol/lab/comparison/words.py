@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from clvol.lab.comparison.figures import ALPHA, COSTS, LEVEL, Efficiency, Figures
-from clvol.lab.comparison.findings import Findings
 from clvol.lab.comparison.measure import uses_sobol
-from clvol.lab.statistics import Interval
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from clvol.lab.comparison.findings import Findings
+    from clvol.lab.statistics import Interval
 
 _HEAVY = 0.5
 """A round with more of the squared error than this, and than four times its share, is not like the others."""

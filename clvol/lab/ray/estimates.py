@@ -9,12 +9,13 @@ import numpy as np
 from clvol.lab.colours import BLACK, GREEN, GREY, VERMILION
 from clvol.lab.ray.looks import CONTROL, DISTANCE, colour, style
 from clvol.lab.ray.walks import Watched, format_estimate
-from clvol.lab.ray.watched import WatchedRay
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.gridspec import SubplotSpec
+
+    from clvol.lab.ray.watched import WatchedRay
 
 BINS = 96
 HEADROOM = 1.3
