@@ -4,7 +4,7 @@
 #if CLVOL_NEE
 #include "emitter/light_sample.h"
 #endif
-#include "stages/path.h"
+#include "core/scene.h"
 
 /* Whether the scattering numbered `bounce` is one too many; what it would have carried on is counted. */
 INLINE bool depth_is_reached(const Scene *scene, uint slot, uint bounce, Spectrum beta)
@@ -20,25 +20,16 @@ INLINE bool depth_is_reached(const Scene *scene, uint slot, uint bounce, Spectru
 }
 
 #if CLVOL_NEE
-/* Makes a shadow ray that brings `value` along if nothing is in its way; `shade` queues it. */
-INLINE void queue_shadow(const Scene *scene, uint group, uint slot, float3 from, const LightSample *light, Spectrum value)
+/* Makes a shadow ray that brings `value` along if nothing is in its way. */
+INLINE void make_shadow_ray(const Scene *scene, uint slot, float3 from, const LightSample *light, Spectrum value)
 {
-    set_path_shadow_x(scene, slot, light->direction.x);
-    set_path_shadow_y(scene, slot, light->direction.y);
-    set_path_shadow_z(scene, slot, light->direction.z);
-#if CLVOL_HAS_POINT || CLVOL_HAS_SPOT || CLVOL_HAS_AREA
+    set_path_shadow_direction(scene, slot, light->direction);
     set_path_shadow_distance(scene, slot, light->distance);
-#endif
-#if CLVOL_HAS_SURFACES
-    set_path_shadow_origin_x(scene, slot, from.x);
-    set_path_shadow_origin_y(scene, slot, from.y);
-    set_path_shadow_origin_z(scene, slot, from.z);
-#endif
+    set_path_shadow_origin(scene, slot, from);
 #if CLVOL_HAS_AREA
     set_path_shadow_primitive(scene, slot, light->primitive);
 #endif
-    set_shadow(scene, slot, value);
-    set_path_event(scene, slot, EVENT_SHADOW);
+    set_path_shadow_light(scene, slot, value);
 }
 #endif
 

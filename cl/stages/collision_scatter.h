@@ -15,8 +15,11 @@
 #if CLVOL_HAS_SCATTERING
 #include "stages/bounce.h"
 #endif
+#include "path/key.h"
+#include "path/ray.h"
+#include "path/reset.h"
+#include "path/weight.h"
 #include "stages/first_hit.h"
-#include "stages/path.h"
 #include "tracking/probability.h"
 
 /* Weight of a path below which absorption is sampled (absorption "mixed").  On cloud.xml, with
@@ -43,9 +46,7 @@ INLINE bool survives_absorption(const Scene *scene, uint slot, SampleKey key, ui
     } else {
         *beta *= albedo;
         float weight = spectrum_max(*beta);
-#if CLVOL_HAS_TRANSMISSION
         weight *= path_eta_squared(scene, slot);
-#endif
         if (CLVOL_ABSORPTION == ABSORPTION_MIXED)
             survival = min_of(1.0f, weight * (1.0f / MIXED_WEIGHT));
         else
@@ -61,45 +62,42 @@ INLINE bool survives_absorption(const Scene *scene, uint slot, SampleKey key, ui
     return true;
 }
 
-/* Next-event estimation: queues a shadow ray towards one light. */
-INLINE void next_event(const Scene *scene, uint group, uint slot, SampleKey key, __global const Medium *medium,
-                              float3 p, float3 wo, Spectrum beta)
+/* Next-event estimation: whether it made a shadow ray, towards one light. */
+INLINE bool next_event(const Scene *scene, uint slot, SampleKey key, __global const Medium *medium, float3 p, float3 wo,
+                       Spectrum beta)
 {
 #if CLVOL_NEE
     if (!medium->sample_emitters)
-        return;
+        return false;
     const uint4 k = decision_block(scene, key, BLOCK_LIGHT, 0);
     const LightSample light =
         sample_light(scene, p, uniform_below_one(k.x), uniform_below_one(k.y), uniform_below_one(k.z));
     const float pdf = phase_pdf(scene, medium, wo, light.direction);
     const float weight = light.pdf > 0.0f ? mis_weight(light.pdf, pdf) : 1.0f;
-    const Spectrum value = beta * to_spectrum(light.value, (int)path_channel_or_zero(scene, slot)) * (pdf * weight);
+    const Spectrum value = beta * to_spectrum(light.value, (int)path_channel(scene, slot)) * (pdf * weight);
     if (!(spectrum_max(value) > 0.0f))
-        return;
-#if CLVOL_BOUNDARY_WORDS > 0
-    set_shadow_inside(scene, slot, get_inside(scene, slot));
-#endif
-    queue_shadow(scene, group, slot, p, &light, value);
+        return false;
+    set_path_shadow_inside(scene, slot, path_inside(scene, slot));
+    make_shadow_ray(scene, slot, p, &light, value);
+    return true;
+#else
+    return false;
 #endif
 }
 
 /* The path goes on from p; returns false when it ends there. */
-INLINE bool scatter(const Scene *scene, uint group, uint slot, SampleKey key, __global const Medium *medium,
-                           Spectrum beta)
+INLINE bool scatter(const Scene *scene, uint slot, SampleKey key, __global const Medium *medium, Spectrum beta,
+                    bool *shadow_ray)
 {
     key.bounce += 1;
     if (depth_is_reached(scene, slot, key.bounce, beta))
         return false;
     set_path_bounce(scene, slot, key.bounce); /* also numbers the shadow ray's random numbers */
     const Ray ray = path_ray(scene, slot);
-    next_event(scene, group, slot, key, medium, ray.o, ray.d, beta);
+    *shadow_ray = next_event(scene, slot, key, medium, ray.o, ray.d, beta);
     const uint4 k = decision_block(scene, key, BLOCK_DIRECTION, 0);
     if (key.bounce > scene->render->rr_depth) {
-        float survival = spectrum_max(beta);
-#if CLVOL_HAS_TRANSMISSION
-        survival *= path_eta_squared(scene, slot);
-#endif
-        survival = min_of(1.0f, survival);
+        const float survival = min_of(1.0f, spectrum_max(beta) * path_eta_squared(scene, slot));
         if (survival < 1.0f && !(uniform_float(k.z) < survival)) /* uniform_float may round to 1 */
             return false;
         beta /= survival;
@@ -107,33 +105,27 @@ INLINE bool scatter(const Scene *scene, uint group, uint slot, SampleKey key, __
     float pdf;
     const float3 wi = phase_sample(scene, medium, ray.d, uniform_below_one(k.x), uniform_below_one(k.y),
                                    uniform_float(k.w), &pdf);
-#if CLVOL_MIS
     set_path_pdf(scene, slot, medium->sample_emitters ? pdf : 0.0f);
-#endif
     set_path_direction(scene, slot, wi);
-    set_beta(scene, slot, beta);
+    set_path_beta(scene, slot, beta);
     record_weight(scene, slot, spectrum_max(beta));
     reset_ray(scene, slot);
     return true;
 }
 #endif
 
-/* Returns false when the path ends at the collision. */
-INLINE bool shade_collision(const Scene *scene, uint group, uint slot)
+/* Returns false when the path ends at the collision; `shadow_ray`: whether it made one. */
+INLINE bool shade_collision(const Scene *scene, uint slot, bool *shadow_ray)
 {
-#if CLVOL_HAS_MANY_MEDIA
     const int number = path_medium(scene, slot);
-#else
-    const int number = 0;
-#endif
     __global const Medium *medium = scene->media + number;
-    const uint interval = path_stretch_or_zero(scene, slot) * scene->render->media + (uint)number;
+    const uint interval = path_stretch(scene, slot) * scene->render->media + (uint)number;
     const float3 p = path_ray(scene, slot).o;
-    const int channel = (int)path_channel_or_zero(scene, slot);
-    Spectrum beta = get_beta(scene, slot);
+    const int channel = (int)path_channel(scene, slot);
+    Spectrum beta = path_beta(scene, slot);
 #if CLVOL_EMISSION_AT_COLLISIONS /* of overlapping media: their walks do not know which collision counts */
     if (!CLVOL_HAS_MAX_DEPTH || scene->render->max_depth > 0)
-        set_radiance(scene, slot, get_radiance(scene, slot) + beta * medium_source(scene, medium, p, channel));
+        set_path_radiance(scene, slot, path_radiance(scene, slot) + beta * medium_source(scene, medium, p, channel));
 #endif
 #if CLVOL_FIRST_HIT
     first_collision(scene, slot, p, medium_albedo(scene, medium, p, channel));
@@ -142,7 +134,7 @@ INLINE bool shade_collision(const Scene *scene, uint group, uint slot)
     const SampleKey key = path_key(scene, slot);
     if (!survives_absorption(scene, slot, key, interval, medium_albedo(scene, medium, p, channel), &beta))
         return false;
-    return scatter(scene, group, slot, key, medium, beta);
+    return scatter(scene, slot, key, medium, beta, shadow_ray);
 #else
     return false;
 #endif

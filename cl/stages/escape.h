@@ -4,7 +4,7 @@
 #define CLVOL_STAGES_ESCAPE_H
 #if CLVOL_HAS_CONSTANT || CLVOL_HAS_ENVMAP
 #include "emitter/emitter.h"
-#include "stages/path.h"
+#include "path/ray.h"
 
 INLINE void shade_escape(const Scene *scene, uint slot)
 {
@@ -16,13 +16,11 @@ INLINE void shade_escape(const Scene *scene, uint slot)
 #endif
     float light_pdf;
     const float3 rgb = environment(scene, path_ray(scene, slot).d, &light_pdf);
-    Spectrum radiance = get_beta(scene, slot) * to_spectrum(rgb, (int)path_channel_or_zero(scene, slot));
-#if CLVOL_MIS
+    Spectrum radiance = path_beta(scene, slot) * to_spectrum(rgb, (int)path_channel(scene, slot));
     const float pdf = path_pdf(scene, slot);
     if (pdf > 0.0f)
         radiance *= mis_weight(pdf, light_pdf);
-#endif
-    set_radiance(scene, slot, get_radiance(scene, slot) + radiance);
+    set_path_radiance(scene, slot, path_radiance(scene, slot) + radiance);
 }
 
 #endif

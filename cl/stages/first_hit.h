@@ -6,7 +6,7 @@
 #include "bsdf/sample.h"
 #include "geometry/surface.h"
 #endif
-#include "stages/path.h"
+#include "core/scene.h"
 
 /* As three channels; a path that follows one of them stands for the sum of three paths. */
 INLINE float3 to_rgb(Spectrum s, int channel)
@@ -24,18 +24,18 @@ INLINE float3 to_rgb(Spectrum s, int channel)
    channel, the rest by the mean of the channels. */
 INLINE void record_weighted(const Scene *scene, uint slot, float3 p, float3 normal, Spectrum albedo)
 {
-    Spectrum beta = get_beta(scene, slot);
-#if CLVOL_HAS_SIGNED_FILTER
-    beta *= path_sample_weight(scene, slot);
-#endif
+    const Spectrum beta = path_beta(scene, slot) * path_sample_weight(scene, slot);
 #if CLVOL_SPECTRUM == 3
     const float weight = (beta.x + beta.y + beta.z) * (1.0f / 3.0f);
 #else
     const float weight = beta;
 #endif
     const float depth = length(p - load_vector(scene->render->camera_eye));
-    record_first_hit(scene, slot, weight * depth, weight * normal,
-                     to_rgb(beta * albedo, (int)path_channel_or_zero(scene, slot)), weight * p, weight);
+    set_path_depth(scene, slot, weight * depth);
+    set_path_normal(scene, slot, weight * normal);
+    set_path_albedo(scene, slot, to_rgb(beta * albedo, (int)path_channel(scene, slot)));
+    set_path_position(scene, slot, weight * p);
+    set_path_met(scene, slot, weight);
 }
 
 #if CLVOL_HAS_MEDIA
@@ -51,7 +51,7 @@ INLINE void first_collision(const Scene *scene, uint slot, float3 p, Spectrum al
 /* The colour of the base, where there is one under a coat; else of what is mirrored. */
 INLINE void first_surface(const Scene *scene, uint slot, const Surface *surface, __global const Material *material)
 {
-    const int channel = (int)path_channel_or_zero(scene, slot);
+    const int channel = (int)path_channel(scene, slot);
     if (path_bounce(scene, slot) > 0)
         return;
     const bool base = material->kind == MATERIAL_DIFFUSE || material->kind == MATERIAL_PLASTIC ||

@@ -2,7 +2,8 @@
 #ifndef CLVOL_STAGES_GENERATE_H
 #define CLVOL_STAGES_GENERATE_H
 #include "core/sampler.h"
-#include "stages/path.h"
+#include "path/reset.h"
+#include "path/transitions.h"
 
 /* A job is one sample of one pixel, or, where a path follows one channel, a third of it; consecutive jobs are
    channels of a sample and samples of a pixel, so that rays that run together stay together. */
@@ -10,11 +11,7 @@ INLINE void write_result(const Scene *scene, uint slot, uint job)
 {
     const uint ring_jobs = scene->render->pass_jobs * scene->render->ring_passes;
     const uint place = job % ring_jobs;
-#if CLVOL_HAS_SIGNED_FILTER
-    const Spectrum radiance = path_sample_weight(scene, slot) * get_radiance(scene, slot);
-#else
-    const Spectrum radiance = get_radiance(scene, slot);
-#endif
+    const Spectrum radiance = path_sample_weight(scene, slot) * path_radiance(scene, slot);
 #if CLVOL_SPECTRUM == 1
     scene->results[place] = radiance;
 #else
@@ -106,23 +103,21 @@ INLINE void start_job(const Scene *scene, uint slot, uint job)
     const float x = (float)px + filter_offset(scene, k.x, px, width, &weight);
     const float y = (float)py + filter_offset(scene, k.y, py, render->film_size[1], &weight);
     set_camera_ray(scene, slot, x, y, uniform_float(k.z), uniform_float(k.w));
-#if CLVOL_HAS_SIGNED_FILTER
     set_path_sample_weight(scene, slot, weight);
-#endif
-#if CLVOL_ONE_CHANNEL_PER_PATH
     set_path_channel(scene, slot, job % CLVOL_JOBS_PER_SAMPLE);
-#endif
-    set_beta(scene, slot, (Spectrum)(1.0f));
-    set_radiance(scene, slot, (Spectrum)(0.0f));
+    set_path_beta(scene, slot, (Spectrum)(1.0f));
+    set_path_radiance(scene, slot, (Spectrum)(0.0f));
     set_path_pixel(scene, slot, key.pixel);
     set_path_sample(scene, slot, key.sample);
     set_path_job(scene, slot, job);
     set_path_bounce(scene, slot, 0);
     reset_counts(scene, slot);
-    reset_first_hit(scene, slot);
-#if CLVOL_MIS
     set_path_pdf(scene, slot, 0.0f);
-#endif
+    set_path_depth(scene, slot, 0.0f);
+    set_path_normal(scene, slot, (float3)(0.0f));
+    set_path_albedo(scene, slot, (float3)(0.0f));
+    set_path_position(scene, slot, (float3)(0.0f));
+    set_path_met(scene, slot, 0.0f);
     reset_path(scene, slot);
 }
 
@@ -139,7 +134,7 @@ INLINE bool take_job(const Scene *scene, uint group, uint slot)
         return false;
     }
     start_job(scene, slot, job);
-    queue_push(scene, group, QUEUE_INTERSECT, slot);
+    to_intersect(scene, group, slot);
     return true;
 }
 
@@ -149,7 +144,7 @@ INLINE void generate(const Scene *scene, uint group, uint slot)
     write_result(scene, slot, path_job(scene, slot));
     set_path_job(scene, slot, NO_JOB);
     if (!take_job(scene, group, slot))
-        atomic_inc(idle_counter(scene, group));
+        to_idle(scene, group, slot);
 }
 
 /* Slots left idle earlier, now that the limit may have risen. */

@@ -6,41 +6,49 @@
 #if CLVOL_CAMERA_INSIDE
 #include "stages/boundary.h"
 #endif
-#include "stages/hit.h"
 #if CLVOL_HAS_STRETCHES
 #include "stages/media.h"
 #endif
-#include "stages/path.h"
+#include "path/ray.h"
+#include "path/transitions.h"
 
 #if CLVOL_HAS_SURFACES
-/* Finds the first surface beyond those already passed. */
-INLINE void intersect_surfaces(const Scene *scene, uint slot, Ray ray)
+INLINE void set_path_hit(const Scene *scene, uint slot, const Hit *hit)
 {
-    const Hit hit = closest_hit(scene, ray, path_after(scene, slot), path_after_primitive_or_none(scene, slot),
+    set_path_hit_t(scene, slot, hit->primitive == NO_PRIMITIVE ? INFINITY : hit->t);
+    set_path_hit_primitive(scene, slot, hit->primitive);
+    set_path_hit_u(scene, slot, hit->u);
+    set_path_hit_v(scene, slot, hit->v);
+}
+
+/* Finds the first surface beyond those already passed; whether there is one. */
+INLINE bool intersect_surfaces(const Scene *scene, uint slot, Ray ray)
+{
+    const Hit hit = closest_hit(scene, ray, path_after_t(scene, slot), path_after_primitive(scene, slot),
                                 ray_limit(scene, slot, ray));
     set_path_hit(scene, slot, &hit);
-    set_path_event(scene, slot, hit.primitive == NO_PRIMITIVE ? EVENT_ESCAPE : EVENT_SURFACE);
 #if CLVOL_CAMERA_INSIDE
-    if (path_bounce(scene, slot) == 0 && path_stretch_or_zero(scene, slot) == 0)
-        set_inside(scene, slot, find_inside(scene, ray));
+    if (path_bounce(scene, slot) == 0 && path_stretch(scene, slot) == 0)
+        set_path_inside(scene, slot, find_inside(scene, ray));
 #endif
+    return hit.primitive != NO_PRIMITIVE;
 }
 #endif
 
 INLINE void intersect(const Scene *scene, uint group, uint slot)
 {
     const Ray ray = path_ray(scene, slot);
+    uint event = EVENT_ESCAPE;
 #if CLVOL_HAS_SURFACES
-    intersect_surfaces(scene, slot, ray);
-#else
-    set_path_event(scene, slot, EVENT_ESCAPE);
+    if (intersect_surfaces(scene, slot, ray))
+        event = EVENT_SURFACE;
 #endif
 #if CLVOL_HAS_STRETCHES
-    const Inside inside = get_inside(scene, slot);
+    const Inside inside = path_inside(scene, slot);
     Part part = {-1, 0.0f, {0.0f, 0.0f, 0.0f}};
-    if (next_part(scene, ray, &inside, path_after(scene, slot), stretch_end(scene, slot, ray),
+    if (next_part(scene, ray, &inside, path_after_t(scene, slot), stretch_end(scene, slot, ray),
                   ray_limit(scene, slot, ray), &part)) {
-        queue_push(scene, group, QUEUE_MEDIUM, slot);
+        to_medium(scene, group, slot, event);
         return;
     }
 #elif CLVOL_HAS_MEDIA
@@ -48,11 +56,11 @@ INLINE void intersect(const Scene *scene, uint group, uint slot)
     if (medium_span(scene->media, ray, 0.0f, INFINITY, &span) && span_t(&span) < ray_limit(scene, slot, ray)) {
         set_path_origin(scene, slot, span_point(&span, ray));
         set_path_interval_end(scene, slot, span.end - span.start);
-        queue_push(scene, group, QUEUE_MEDIUM, slot);
+        to_medium(scene, group, slot, event);
         return;
     }
 #endif
-    queue_push(scene, group, QUEUE_SHADE, slot);
+    to_shade(scene, group, slot, event);
 }
 
 #endif

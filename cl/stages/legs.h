@@ -38,23 +38,5 @@ INLINE bool goes_on(Walked walked, Tally *tally)
     return tally->stopped;
 }
 
-#define CLVOL_WALKED_FIELD(prefix) \
-    INLINE Walked get_##prefix##walked(const Scene *scene, uint slot, float from) \
-    { \
-        Walked walked = {path_##prefix##leg(scene, slot), from, 0.0f}; \
-        if (walked.leg > 0) { \
-            set_path_##prefix##leg(scene, slot, 0); \
-            walked.t = path_##prefix##walked(scene, slot); \
-            walked.rest = path_##prefix##walked_rest(scene, slot); \
-        } \
-        return walked; \
-    } \
-    INLINE void set_##prefix##walked(const Scene *scene, uint slot, Walked walked) \
-    { \
-        set_path_##prefix##leg(scene, slot, walked.leg); \
-        set_path_##prefix##walked(scene, slot, walked.t); \
-        set_path_##prefix##walked_rest(scene, slot, walked.rest); \
-    }
-
 #endif
 #endif

@@ -3,26 +3,34 @@
 #define CLVOL_STAGES_MEDIUM_COLLISION_H
 #if CLVOL_HAS_MEDIA
 #include "core/random.h"
+#include "path/tally.h"
+#include "path/weight.h"
 #include "stages/legs.h"
 #include "stages/medium_ray.h"
-#include "stages/path.h"
 #if CLVOL_HAS_HETEROGENEOUS
 #include CLVOL_TECHNIQUE_HEADER
 #include "tracking/thin_emission.h"
 #endif
 #include "tracking/homogeneous.h"
 
-/* Where the path's walk begins, or goes on: `from` where it has not begun. */
-#if CLVOL_HAS_HETEROGENEOUS
-CLVOL_WALKED_FIELD()
-#else
-INLINE Walked get_walked(const Scene *scene, uint slot, float from)
+/* Where the path's walk begins, at `from`, or goes on, which is said once. */
+INLINE Walked take_walked(const Scene *scene, uint slot, float from)
 {
-    const Walked walked = {0, from, 0.0f};
+    Walked walked = {path_leg(scene, slot), from, 0.0f};
+    if (walked.leg > 0) {
+        set_path_leg(scene, slot, 0);
+        walked.t = path_walked(scene, slot);
+        walked.rest = path_walked_rest(scene, slot);
+    }
     return walked;
 }
-#define set_walked(scene, slot, walked)
-#endif
+
+INLINE void set_walked(const Scene *scene, uint slot, Walked walked)
+{
+    set_path_leg(scene, slot, walked.leg);
+    set_path_walked(scene, slot, walked.t);
+    set_path_walked_rest(scene, slot, walked.rest);
+}
 
 INLINE bool medium_collision(const MediumRay *in, uint4 k, Tally *tally, Collision *collision)
 {
@@ -55,7 +63,7 @@ INLINE bool medium_collision(const MediumRay *in, uint4 k, Tally *tally, Collisi
 INLINE void subtract_background(const Scene *scene, uint slot, __global const Medium *medium, int channel, Spectrum beta)
 {
     const Spectrum background = to_spectrum(load_vector(medium->background), channel);
-    set_radiance(scene, slot, get_radiance(scene, slot) + background * (get_beta(scene, slot) - beta));
+    set_path_radiance(scene, slot, path_radiance(scene, slot) + background * (path_beta(scene, slot) - beta));
 }
 #endif
 
@@ -65,10 +73,10 @@ INLINE void record_walk(const Scene *scene, uint slot, Tally tally, Spectrum bet
     record_tally(scene, slot, tally);
 #if CLVOL_EMISSION_ON_WALKS
     if (!CLVOL_HAS_MAX_DEPTH || scene->render->max_depth > 0)
-        set_radiance(scene, slot, get_radiance(scene, slot) + emission);
+        set_path_radiance(scene, slot, path_radiance(scene, slot) + emission);
 #endif
 #if CLVOL_WEIGHTED
-    set_beta(scene, slot, beta);
+    set_path_beta(scene, slot, beta);
     record_weight(scene, slot, max_of(tally.weight, spectrum_max(beta)));
 #endif
 }

@@ -6,6 +6,10 @@
 #include "stages/stretch_sample.h"
 #else
 #include "core/sampler.h"
+#include "path/key.h"
+#include "path/ray.h"
+#include "path/tally.h"
+#include "path/transitions.h"
 #include "stages/medium_collision.h"
 
 /* The one medium of the scene, from the ray's start.  Returns the steps that it took. */
@@ -13,14 +17,14 @@ INLINE uint medium_sample(const Scene *scene, uint group, uint slot)
 {
     const SampleKey key = path_key(scene, slot);
     const Ray ray = path_ray(scene, slot);
-    const Walked walked = get_walked(scene, slot, 0.0f);
+    const Walked walked = take_walked(scene, slot, 0.0f);
     const MediumRay in = rest_of_ray(medium_ray(scene, scene->media, ray, path_interval_end(scene, slot),
-                                                (int)path_channel_or_zero(scene, slot)),
+                                                (int)path_channel(scene, slot)),
                                      walked.t);
     const uint4 k = leg_block(decision_block(scene, key, BLOCK_WALK, 0), walked.leg);
     Tally tally = {0, 0, 0, 0, 0, 0, 0.0f};
     Collision collision;
-    collision.beta = get_beta(scene, slot);
+    collision.beta = path_beta(scene, slot);
     collision.emission = (Spectrum)(0.0f);
     const bool collided = medium_collision(&in, k, &tally, &collision);
     const bool stopped = goes_on(walked, &tally);
@@ -28,14 +32,15 @@ INLINE uint medium_sample(const Scene *scene, uint group, uint slot)
     subtract_background(scene, slot, in.medium, in.channel, collision.beta);
 #endif
     record_walk(scene, slot, tally, collision.beta, collision.emission);
+    uint event = path_event(scene, slot);
     if (stopped) {
         set_walked(scene, slot, walk_on(walked, walked.t, tally.stop_t));
-        set_path_event(scene, slot, EVENT_WALK);
+        event = EVENT_WALK;
     } else if (collided) {
         set_path_origin(scene, slot, ray.o + (walked.t + collision.t) * ray.d);
-        set_path_event(scene, slot, EVENT_COLLISION);
+        event = EVENT_COLLISION;
     }
-    queue_push(scene, group, QUEUE_SHADE, slot);
+    to_shade(scene, group, slot, event);
     return steps_of(&tally);
 }
 #endif

@@ -12,19 +12,36 @@
 #if CLVOL_HAS_AREA
 #include "geometry/surface.h"
 #endif
+#include "path/key.h"
+#include "path/tally.h"
+#include "path/transitions.h"
 #include "stages/legs.h"
 #include "stages/media.h"
-#include "stages/path.h"
 #if CLVOL_HAS_HETEROGENEOUS
 #include CLVOL_TRANSMITTANCE_HEADER
 #endif
 #include "tracking/homogeneous_transmittance.h"
 
-#if CLVOL_HAS_HETEROGENEOUS
-CLVOL_WALKED_FIELD(shadow_)
-#endif
-
 #if CLVOL_HAS_MEDIA
+/* Where the shadow ray's walk begins, at `from`, or goes on, which is said once. */
+INLINE Walked take_shadow_walked(const Scene *scene, uint slot, float from)
+{
+    Walked walked = {path_shadow_leg(scene, slot), from, 0.0f};
+    if (walked.leg > 0) {
+        set_path_shadow_leg(scene, slot, 0);
+        walked.t = path_shadow_walked(scene, slot);
+        walked.rest = path_shadow_walked_rest(scene, slot);
+    }
+    return walked;
+}
+
+INLINE void set_shadow_walked(const Scene *scene, uint slot, Walked walked)
+{
+    set_path_shadow_leg(scene, slot, walked.leg);
+    set_path_shadow_walked(scene, slot, walked.t);
+    set_path_shadow_walked_rest(scene, slot, walked.rest);
+}
+
 INLINE Extinction medium_transmittance(const MediumRay *in, uint4 k, Tally *tally)
 {
 #if CLVOL_HAS_HOMOGENEOUS
@@ -42,14 +59,8 @@ INLINE Extinction medium_transmittance(const MediumRay *in, uint4 k, Tally *tall
 INLINE bool media_transmittance(const Scene *scene, uint slot, SampleKey key, Ray ray, const Inside *inside, uint stretch,
                                 float from, float to, int channel, Tally *tally, Extinction *transmittance)
 {
-    Walked walked = {0, from, 0.0f};
-    uint m = 0;
-#if CLVOL_HAS_HETEROGENEOUS
-    walked = get_shadow_walked(scene, slot, from);
-#if CLVOL_HAS_MANY_MEDIA
-    m = walked.leg > 0 ? path_shadow_medium(scene, slot) : 0;
-#endif
-#endif
+    Walked walked = take_shadow_walked(scene, slot, from);
+    uint m = walked.leg > 0 ? path_shadow_medium(scene, slot) : 0;
     for (; m < (CLVOL_HAS_MANY_MEDIA ? scene->render->media : 1u); ++m, walked.leg = 0, walked.t = from) {
         Span span;
         if (!medium_part(scene, m, ray, inside, walked.t, to, &span))
@@ -63,15 +74,11 @@ INLINE bool media_transmittance(const Scene *scene, uint slot, SampleKey key, Ra
             tally->stopped = 0;
             return false;
         }
-#if CLVOL_HAS_HETEROGENEOUS
         if (goes_on(walked, tally)) {
             set_shadow_walked(scene, slot, walk_on(walked, span_t(&span), tally->stop_t));
-#if CLVOL_HAS_MANY_MEDIA
             set_path_shadow_medium(scene, slot, m);
-#endif
             return false;
         }
-#endif
     }
     return true;
 }
@@ -80,22 +87,9 @@ INLINE bool media_transmittance(const Scene *scene, uint slot, SampleKey key, Ra
 INLINE Ray shadow_ray(const Scene *scene, uint slot)
 {
     Ray ray;
-#if CLVOL_HAS_SURFACES
-    ray.o = (float3)(path_shadow_origin_x(scene, slot), path_shadow_origin_y(scene, slot), path_shadow_origin_z(scene, slot));
-#else
-    ray.o = path_ray(scene, slot).o;
-#endif
-    ray.d = (float3)(path_shadow_x(scene, slot), path_shadow_y(scene, slot), path_shadow_z(scene, slot));
+    ray.o = CLVOL_HAS_SURFACES ? path_shadow_origin(scene, slot) : path_origin(scene, slot);
+    ray.d = path_shadow_direction(scene, slot);
     return ray;
-}
-
-INLINE float shadow_reach(const Scene *scene, uint slot)
-{
-#if CLVOL_HAS_POINT || CLVOL_HAS_SPOT || CLVOL_HAS_AREA
-    return path_shadow_distance(scene, slot);
-#else
-    return INFINITY;
-#endif
 }
 
 #if CLVOL_HAS_SURFACES
@@ -132,23 +126,19 @@ typedef struct {
 INLINE Passed shadow_passed(const Scene *scene, uint slot)
 {
     Passed passed = {0, {0.0f, 0.0f, 0.0f, NO_PRIMITIVE}};
-#if CLVOL_HAS_HETEROGENEOUS
     if (path_shadow_leg(scene, slot) > 0) {
         passed.count = path_shadow_stretch(scene, slot);
         passed.last.t = path_shadow_after_t(scene, slot);
         passed.last.primitive = path_shadow_after_primitive(scene, slot);
     }
-#endif
     return passed;
 }
 
 INLINE void set_shadow_passed(const Scene *scene, uint slot, const Passed *passed)
 {
-#if CLVOL_HAS_HETEROGENEOUS
     set_path_shadow_stretch(scene, slot, passed->count);
     set_path_shadow_after_t(scene, slot, passed->last.t);
     set_path_shadow_after_primitive(scene, slot, passed->last.primitive);
-#endif
 }
 
 /* What share of the light arrives: walks from surface to surface, up to the first that is opaque.  Where a walk stops
@@ -156,14 +146,14 @@ INLINE void set_shadow_passed(const Scene *scene, uint slot, const Passed *passe
 INLINE Spectrum shadow_share(const Scene *scene, uint slot, Tally *tally)
 {
     const Ray ray = shadow_ray(scene, slot);
-    const float reach = shadow_reach(scene, slot);
-    const int channel = (int)path_channel_or_zero(scene, slot);
+    const float reach = path_shadow_distance(scene, slot);
+    const int channel = (int)path_channel(scene, slot);
     Spectrum share = (Spectrum)(1.0f);
 #if CLVOL_HAS_MEDIA
     const SampleKey key = path_key(scene, slot);
     Extinction transmittance = (Extinction)(1.0f);
 #endif
-    Inside inside = get_shadow_inside(scene, slot);
+    Inside inside = path_shadow_inside(scene, slot);
     const Target target = shadow_target(scene, slot, ray, reach);
     for (Passed passed = shadow_passed(scene, slot); passed.count < MOST_PASSED; ++passed.count) {
         Hit hit = closest_hit(scene, ray, passed.last.t, passed.last.primitive, reach);
@@ -186,7 +176,7 @@ INLINE Spectrum shadow_share(const Scene *scene, uint slot, Tally *tally)
             if (!tally->stopped)
                 return (Spectrum)(0.0f);
             set_shadow_passed(scene, slot, &passed);
-            set_shadow_inside(scene, slot, inside);
+            set_path_shadow_inside(scene, slot, inside);
             return share * transmittance;
         }
         if (last)
@@ -207,7 +197,7 @@ INLINE Spectrum shadow_share(const Scene *scene, uint slot, Tally *tally)
 INLINE Spectrum shadow_share(const Scene *scene, uint slot, Tally *tally)
 {
     const Ray ray = shadow_ray(scene, slot);
-    const float reach = shadow_reach(scene, slot);
+    const float reach = path_shadow_distance(scene, slot);
 #if CLVOL_HAS_SURFACES
     const Target target = shadow_target(scene, slot, ray, reach);
     if (any_hit(scene, ray, reach, &target))
@@ -215,10 +205,10 @@ INLINE Spectrum shadow_share(const Scene *scene, uint slot, Tally *tally)
 #endif
     Spectrum share = (Spectrum)(1.0f);
 #if CLVOL_HAS_MEDIA
-    Inside inside = get_shadow_inside(scene, slot);
+    Inside inside = path_shadow_inside(scene, slot);
     Extinction transmittance = (Extinction)(1.0f);
     media_transmittance(scene, slot, path_key(scene, slot), ray, &inside, 0, 0.0f, reach,
-                        (int)path_channel_or_zero(scene, slot), tally, &transmittance);
+                        (int)path_channel(scene, slot), tally, &transmittance);
     share *= transmittance;
 #endif
     return share;
@@ -234,11 +224,14 @@ INLINE uint shadow_transmittance(const Scene *scene, uint group, uint slot)
     record_tally(scene, slot, tally);
 #endif
     if (tally.stopped) {
-        set_shadow(scene, slot, get_shadow(scene, slot) * share);
-        queue_push(scene, group, QUEUE_SHADE, slot);
+        set_path_shadow_light(scene, slot, path_shadow_light(scene, slot) * share);
+        to_shade(scene, group, slot, EVENT_SHADOW);
     } else {
-        set_radiance(scene, slot, get_radiance(scene, slot) + get_shadow(scene, slot) * share);
-        queue_push(scene, group, path_next(scene, slot), slot);
+        set_path_radiance(scene, slot, path_radiance(scene, slot) + path_shadow_light(scene, slot) * share);
+        if (path_goes_on(scene, slot))
+            to_intersect(scene, group, slot);
+        else
+            to_generate(scene, group, slot);
     }
     return steps_of(&tally);
 }

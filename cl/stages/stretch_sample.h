@@ -8,9 +8,12 @@
 #ifndef CLVOL_STAGES_STRETCH_SAMPLE_H
 #define CLVOL_STAGES_STRETCH_SAMPLE_H
 #include "core/sampler.h"
+#include "path/key.h"
+#include "path/ray.h"
+#include "path/tally.h"
+#include "path/transitions.h"
 #include "stages/media.h"
 #include "stages/medium_collision.h"
-#include "stages/path.h"
 
 /* The factor by which a walk changed the path's weight; what had no weight keeps none. */
 INLINE Spectrum weight_ratio(Spectrum after, Spectrum before)
@@ -31,11 +34,11 @@ INLINE uint medium_sample(const Scene *scene, uint group, uint slot)
 {
     const SampleKey key = path_key(scene, slot);
     const Ray ray = path_ray(scene, slot);
-    const Inside inside = get_inside(scene, slot);
-    const uint stretch = path_stretch_or_zero(scene, slot);
-    const Walked walked = get_walked(scene, slot, path_after(scene, slot));
+    const Inside inside = path_inside(scene, slot);
+    const uint stretch = path_stretch(scene, slot);
+    const Walked walked = take_walked(scene, slot, path_after_t(scene, slot));
     const float from = walked.t, to = stretch_end(scene, slot, ray);
-    const Spectrum before = get_beta(scene, slot);
+    const Spectrum before = path_beta(scene, slot);
     Tally tally = {0, 0, 0, 0, 0, 0, 0.0f};
     Collision collision;
     collision.emission = (Spectrum)(0.0f);
@@ -60,7 +63,7 @@ INLINE uint medium_sample(const Scene *scene, uint group, uint slot)
             start.o = span_point(&part.span, ray);
             const float length = min_of(part.span.end - part.span.start, reach - part.start);
             const MediumRay in =
-                part_ray(scene, &inside, part.medium, start, length, (int)path_channel_or_zero(scene, slot));
+                part_ray(scene, &inside, part.medium, start, length, (int)path_channel(scene, slot));
             const uint4 k = leg_block(
                 decision_block(scene, key, BLOCK_WALK, walk_number(scene, stretch, part.medium)), walked.leg);
             collision.beta = JOINT_WEIGHTS ? before : beta;
@@ -83,20 +86,19 @@ INLINE uint medium_sample(const Scene *scene, uint group, uint slot)
 #if CLVOL_WEIGHTED
     Part first = {-1, 0.0f, {0.0f, 0.0f, 0.0f}};
     if (next_part(scene, ray, &inside, from, to, INFINITY, &first))
-        subtract_background(scene, slot, scene->media + first.medium, (int)path_channel_or_zero(scene, slot), beta);
+        subtract_background(scene, slot, scene->media + first.medium, (int)path_channel(scene, slot), beta);
 #endif
     record_walk(scene, slot, tally, beta, collision.emission);
+    uint event = path_event(scene, slot);
     if (stopped) {
         set_walked(scene, slot, reached);
-        set_path_event(scene, slot, EVENT_WALK);
+        event = EVENT_WALK;
     } else if (winner >= 0) {
-#if CLVOL_HAS_MANY_MEDIA
         set_path_medium(scene, slot, winner);
-#endif
         set_path_origin(scene, slot, end);
-        set_path_event(scene, slot, EVENT_COLLISION);
+        event = EVENT_COLLISION;
     }
-    queue_push(scene, group, QUEUE_SHADE, slot);
+    to_shade(scene, group, slot, event);
     return steps_of(&tally);
 }
 

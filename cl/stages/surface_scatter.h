@@ -8,20 +8,32 @@
 #include "emitter/area.h"
 #include "emitter/emitter.h"
 #include "geometry/surface.h"
+#include "path/key.h"
+#include "path/ray.h"
+#include "path/reset.h"
 #include "stages/bounce.h"
 #include "stages/boundary.h"
 #include "stages/first_hit.h"
-#include "stages/hit.h"
-#include "stages/path.h"
 #include "stages/side.h"
+
+/* What `intersect` found. */
+INLINE Hit path_hit(const Scene *scene, uint slot)
+{
+    Hit hit;
+    hit.t = path_hit_t(scene, slot);
+    hit.primitive = path_hit_primitive(scene, slot);
+    hit.u = path_hit_u(scene, slot);
+    hit.v = path_hit_v(scene, slot);
+    return hit;
+}
 
 #if CLVOL_HAS_PASSABLE
 /* The ray goes straight on behind the surface: no scattering, and no bounce. */
 INLINE bool pass_on(const Scene *scene, uint slot, Ray ray, const Hit *hit, const Surface *surface)
 {
-    Inside inside = get_inside(scene, slot);
+    Inside inside = path_inside(scene, slot);
     cross_boundary(scene->shapes + surface->shape, surface->ng, ray.d, &inside);
-    set_inside(scene, slot, inside);
+    set_path_inside(scene, slot, inside);
     set_path_after_t(scene, slot, hit->t);
     set_path_after_primitive(scene, slot, hit->primitive);
     const uint stretch = path_stretch(scene, slot) + 1;
@@ -42,40 +54,43 @@ INLINE void gather_lamp(const Scene *scene, uint slot, Ray ray, const Hit *hit, 
         return;
 #endif
     const float3 rgb = area_radiance(scene, surface, ray.d);
-    Spectrum radiance = get_beta(scene, slot) * to_spectrum(rgb, (int)path_channel_or_zero(scene, slot));
+    Spectrum radiance = path_beta(scene, slot) * to_spectrum(rgb, (int)path_channel(scene, slot));
 #if CLVOL_MIS
     const float pdf = path_pdf(scene, slot);
     if (pdf > 0.0f)
         radiance *= mis_weight(pdf, area_pdf(scene, surface, ray.o, ray.d, hit->t));
 #endif
-    set_radiance(scene, slot, get_radiance(scene, slot) + radiance);
+    set_path_radiance(scene, slot, path_radiance(scene, slot) + radiance);
 }
 #endif
 
-/* Next-event estimation from a surface: queues a shadow ray towards one light. */
-INLINE void surface_next_event(const Scene *scene, uint group, uint slot, SampleKey key, const Surface *surface,
-                               const Side *side, float3 wi, Spectrum beta)
+/* Next-event estimation from a surface: whether it made a shadow ray, towards one light. */
+INLINE bool surface_next_event(const Scene *scene, uint slot, SampleKey key, const Surface *surface, const Side *side,
+                               float3 wi, Spectrum beta)
 {
 #if CLVOL_NEE
     if (material_is_smooth(side->material))
-        return;
+        return false;
     const uint4 k = decision_block(scene, key, BLOCK_LIGHT, 0);
     LightSample light =
         sample_light(scene, surface->p, uniform_below_one(k.x), uniform_below_one(k.y), uniform_below_one(k.z));
     float pdf;
-    const int channel = (int)path_channel_or_zero(scene, slot);
+    const int channel = (int)path_channel(scene, slot);
     const Spectrum f = bsdf_value(scene, side->material, surface->uv, on_side(side, wi),
                                   on_side(side, to_local(surface, light.direction)), channel, &pdf);
     const float weight = light.pdf > 0.0f ? mis_weight(light.pdf, pdf) : 1.0f;
     const Spectrum value = beta * f * to_spectrum(light.value, channel) * weight;
     if (spectrum_max(value) == 0.0f)
-        return;
-    Inside inside = get_inside(scene, slot);
+        return false;
+    Inside inside = path_inside(scene, slot);
     cross_boundary(scene->shapes + surface->shape, surface->ng, light.direction, &inside);
-    set_shadow_inside(scene, slot, inside);
+    set_path_shadow_inside(scene, slot, inside);
     const float3 start = spawn_point(surface, light.direction);
     light.distance -= dot(start - surface->p, light.direction); /* now from there */
-    queue_shadow(scene, group, slot, start, &light, value);
+    make_shadow_ray(scene, slot, start, &light, value);
+    return true;
+#else
+    return false;
 #endif
 }
 
@@ -83,12 +98,9 @@ INLINE void surface_next_event(const Scene *scene, uint group, uint slot, Sample
 INLINE bool leave_surface(const Scene *scene, uint slot, SampleKey key, const Surface *surface, float3 d, float pdf,
                           float eta, Spectrum beta)
 {
-    float survival = spectrum_max(beta);
-#if CLVOL_HAS_TRANSMISSION
-    const float eta_squared = path_eta_squared(scene, slot) * eta * eta;
+    const float eta_squared = CLVOL_HAS_TRANSMISSION ? path_eta_squared(scene, slot) * eta * eta : 1.0f;
     set_path_eta_squared(scene, slot, eta_squared);
-    survival *= eta_squared;
-#endif
+    const float survival = spectrum_max(beta) * eta_squared;
     if (survival == 0.0f) /* not so for NaN, which is to be seen */
         return false;
     if (key.bounce > scene->render->rr_depth && survival < 1.0f) {
@@ -97,21 +109,19 @@ INLINE bool leave_surface(const Scene *scene, uint slot, SampleKey key, const Su
             return false;
         beta /= survival;
     }
-    Inside inside = get_inside(scene, slot);
+    Inside inside = path_inside(scene, slot);
     cross_boundary(scene->shapes + surface->shape, surface->ng, d, &inside);
-    set_inside(scene, slot, inside);
+    set_path_inside(scene, slot, inside);
     set_path_origin(scene, slot, spawn_point(surface, d));
     set_path_direction(scene, slot, d);
-    set_beta(scene, slot, beta);
-#if CLVOL_MIS
+    set_path_beta(scene, slot, beta);
     set_path_pdf(scene, slot, pdf);
-#endif
     reset_ray(scene, slot);
     return true;
 }
 
-/* Returns false when the path ends at the surface. */
-INLINE bool shade_surface(const Scene *scene, uint group, uint slot)
+/* Returns false when the path ends at the surface; `shadow_ray`: whether it made one. */
+INLINE bool shade_surface(const Scene *scene, uint slot, bool *shadow_ray)
 {
     const Ray ray = path_ray(scene, slot);
     const Hit hit = path_hit(scene, slot);
@@ -130,7 +140,7 @@ INLINE bool shade_surface(const Scene *scene, uint group, uint slot)
     Side side;
     if (!side_of(scene, shape, wi, &side))
         return false;
-    const uint4 k = decision_block(scene, key, BLOCK_SURFACE, path_stretch_or_zero(scene, slot));
+    const uint4 k = decision_block(scene, key, BLOCK_SURFACE, path_stretch(scene, slot));
 #if CLVOL_HAS_PASSABLE
     if (side.material->kind == MATERIAL_NULL)
         return pass_on(scene, slot, ray, &hit, &surface);
@@ -140,13 +150,13 @@ INLINE bool shade_surface(const Scene *scene, uint group, uint slot)
 #endif
 #if CLVOL_HAS_REFLECTION
     BsdfSample sample;
-    Spectrum beta = get_beta(scene, slot);
+    Spectrum beta = path_beta(scene, slot);
     const bool sampled =
         bsdf_sample(scene, side.material, surface.uv, on_side(&side, wi), uniform_below_one(k.y),
-                    uniform_below_one(k.z), uniform_float(k.w), (int)path_channel_or_zero(scene, slot), &sample);
+                    uniform_below_one(k.z), uniform_float(k.w), (int)path_channel(scene, slot), &sample);
 #if CLVOL_HAS_PASSABLE
     if (sampled && sample.passes) {
-        set_beta(scene, slot, beta * sample.weight);
+        set_path_beta(scene, slot, beta * sample.weight);
         return pass_on(scene, slot, ray, &hit, &surface);
     }
 #endif
@@ -157,7 +167,7 @@ INLINE bool shade_surface(const Scene *scene, uint group, uint slot)
     if (depth_is_reached(scene, slot, key.bounce, beta))
         return false;
     set_path_bounce(scene, slot, key.bounce); /* also numbers the shadow ray's random numbers */
-    surface_next_event(scene, group, slot, key, &surface, &side, wi, beta);
+    *shadow_ray = surface_next_event(scene, slot, key, &surface, &side, wi, beta);
     if (!sampled)
         return false;
     const float3 d = normalize(to_world(&surface, on_side(&side, sample.direction)));

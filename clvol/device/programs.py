@@ -24,9 +24,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from clvol.device.device import Device
+    from clvol.layout.stages import Stage
     from clvol.planning.config import KernelConfig
 
-LAYOUT = "layout"
+LAYOUT, CONTRACT = "layout", "contract"
 SHARED = {
     "CLVOL_SHARED_HEADER": "layout, shared",
     "CLVOL_BSDFS_HEADER": "layout, kinds of BSDF",
@@ -62,19 +63,23 @@ def slots(config: KernelConfig) -> dict[str, str]:
     return {f"CLVOL_{name}_HEADER": file for name, file in files.items()}
 
 
-def expand(text: str, macros: Mapping[str, int], slots: Mapping[str, str], records: str) -> str:
-    """A translation unit of `text` and all that it includes; `records` stands in core/scene.h.
+def expand(
+    text: str, macros: Mapping[str, int], slots: Mapping[str, str], records: str, contract: str = ""
+) -> str:
+    """A translation unit of `text` and all that it includes.
+
+    `records` stands in core/scene.h, and `contract` in path/transitions.h.
 
     Only the macros that occur in it are defined: caches are keyed on the text, and stages that a choice
     does not touch are not built again.
     """
     shared = layout.shared_text(), layout.kinds_text("BSDF"), layout.kinds_text("PHASE")
-    generated = {LAYOUT: records} | dict(zip(SHARED.values(), shared, strict=True))
+    generated = {LAYOUT: records, CONTRACT: contract} | dict(zip(SHARED.values(), shared, strict=True))
 
     def read(name: str) -> str:
         return generated[name] if name in generated else kernel_source(name)
 
-    slots = {**slots, **SHARED, "CLVOL_LAYOUT_HEADER": LAYOUT}
+    slots = {**slots, **SHARED, "CLVOL_LAYOUT_HEADER": LAYOUT, "CLVOL_CONTRACT_HEADER": CONTRACT}
     expanded = Preprocessor(read, macros, slots).expand(text, "unit")
     body = "\n".join(expanded) + "\n"
     used = set(re.findall(r"\bCLVOL_\w+", body))
@@ -82,14 +87,24 @@ def expand(text: str, macros: Mapping[str, int], slots: Mapping[str, str], recor
     return "/* Composed by clvol. */\n" + "".join(defines) + body
 
 
-def compose(config: KernelConfig, text: str, macros: Mapping[str, int] = MappingProxyType({})) -> str:
-    """The translation unit of `text` for a configuration, and more macros."""
-    return expand(text, {**config.macros, **macros}, slots(config), layout.layout_text(config.macros))
+def compose(
+    config: KernelConfig,
+    text: str,
+    macros: Mapping[str, int] = MappingProxyType({}),
+    stage: Stage | None = None,
+) -> str:
+    """The translation unit of `text` for a configuration, and more macros; `stage`: whose contract holds."""
+    records = layout.layout_text(config.macros, stage)
+    contract = layout.stage_text(config.macros, stage) if stage else ""
+    return expand(text, {**config.macros, **macros}, slots(config), records, contract)
 
 
 def stage_source(config: KernelConfig, stage: str) -> str:
     """The composed source of one stage kernel, or of `accumulate`."""
-    return compose(config, f'#include "kernels/{stage}.cl"\n')
+    if stage == "accumulate":
+        return compose(config, '#include "kernels/accumulate.cl"\n')
+    text = f'#include "stages/{stage}.h"\n#include "kernels/stage.cl"\n'
+    return compose(config, text, stage=layout.stage(stage))
 
 
 def build(device: Device, source: str, name: str) -> cl.Program:

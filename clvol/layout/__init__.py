@@ -57,6 +57,8 @@ from clvol.layout.records import (
     enum,
 )
 from clvol.layout.shared_text import kinds_text, record_text, shared_text
+from clvol.layout.stage_text import stage_text
+from clvol.layout.stages import EVENTS, QUEUES, STAGES, launched, stage
 from clvol.layout.text import layout_text
 
 __all__ = [
@@ -82,6 +84,7 @@ __all__ = [
     "EMITTER",
     "ENUMS",
     "ENVMAP",
+    "EVENTS",
     "FIRST_HIT",
     "MATERIAL",
     "MEDIUM",
@@ -90,11 +93,13 @@ __all__ = [
     "PATH_STATE",
     "PHASE",
     "QUADRIC",
+    "QUEUES",
     "RANDOMIZATIONS",
     "RECORDS",
     "RENDER",
     "SHAPE",
     "SLOT_STATISTICS",
+    "STAGES",
     "TEXTURE",
     "VOLUME",
     "Argument",
@@ -106,6 +111,7 @@ __all__ = [
     "enum",
     "first_hit_fields",
     "kinds_text",
+    "launched",
     "layout_text",
     "path_counts",
     "path_fields",
@@ -113,4 +119,6 @@ __all__ = [
     "shared_text",
     "shows_weight",
     "slot_fields",
+    "stage",
+    "stage_text",
 ]

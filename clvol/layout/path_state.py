@@ -31,6 +31,7 @@ class Declared:
     needs : macros all of which must be other than 0.  unless : a macro that must be 0.
     parts : what follows the name, each time in a field of its own; times : the macro that says how many
         numbered fields there are instead.
+    absent : what stages read where there is none.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Declared:
     unless: str = ""
     parts: tuple[str, ...] = ("",)
     times: str = ""
+    absent: str = "0"
 
     def fields(self, macros: Macros) -> list[PathField]:
         """What there is of it under these macros."""
@@ -103,7 +105,11 @@ PATH_STATE: tuple[Declared, ...] = (
     _count("cells", _WALKS),
     _count("violations", _WALKS),
     Declared(
-        "sample_weight", "f", "what the pixel filter multiplies the result by", ("CLVOL_HAS_SIGNED_FILTER",)
+        "sample_weight",
+        "f",
+        "what the pixel filter multiplies the result by",
+        ("CLVOL_HAS_SIGNED_FILTER",),
+        absent="1.0f",
     ),
     Declared("channel", "u", "the one channel this path follows", ("CLVOL_ONE_CHANNEL_PER_PATH",)),
     Declared("pdf", "f", "density of the last direction; 0 where MIS does not apply", ("CLVOL_MIS",)),
@@ -116,22 +122,48 @@ PATH_STATE: tuple[Declared, ...] = (
         ("CLVOL_HAS_MEDIA",),
         unless="CLVOL_HAS_STRETCHES",
     ),
-    Declared("hit_t", "f", "ray parameter of the surface hit, infinite if none", ("CLVOL_HAS_SURFACES",)),
-    Declared("hit_primitive", "u", "primitive that was hit", ("CLVOL_HAS_SURFACES",)),
-    Declared("hit", "f", "where on it", ("CLVOL_HAS_TRIANGLES",), parts=("_u", "_v")),
+    Declared(
+        "hit_t",
+        "f",
+        "ray parameter of the surface hit, infinite if none",
+        ("CLVOL_HAS_SURFACES",),
+        absent="INFINITY",
+    ),
+    Declared("hit_primitive", "u", "primitive that was hit", ("CLVOL_HAS_SURFACES",), absent="NO_PRIMITIVE"),
+    Declared("hit_u", "f", "where on it", ("CLVOL_HAS_TRIANGLES",)),
+    Declared("hit_v", "f", "where on it", ("CLVOL_HAS_TRIANGLES",)),
     Declared("stretch", "u", "surfaces passed since the last scattering", ("CLVOL_HAS_PASSABLE",)),
     Declared("after_t", "f", "ray parameter of the last surface passed", ("CLVOL_HAS_PASSABLE",)),
-    Declared("after_primitive", "u", "primitive of the last surface passed", ("CLVOL_HAS_PASSABLE",)),
+    Declared(
+        "after_primitive",
+        "u",
+        "primitive of the last surface passed",
+        ("CLVOL_HAS_PASSABLE",),
+        absent="NO_PRIMITIVE",
+    ),
     Declared("inside", "u", "a bit for each boundary the path is inside of", times="CLVOL_BOUNDARY_WORDS"),
     Declared(
         "eta_squared",
         "f",
         "squared index of what the path is in, for roulette",
         ("CLVOL_HAS_TRANSMISSION",),
+        absent="1.0f",
     ),
-    Declared("shadow", "f", "direction to the light", (_NEE,), parts=XYZ),
-    Declared("shadow_distance", "f", "distance to the light", (_NEE, "CLVOL_HAS_NEAR_LIGHTS")),
-    Declared("shadow_primitive", "u", "primitive of the light's point", (_NEE, "CLVOL_HAS_AREA")),
+    Declared("shadow_direction", "f", "direction to the light", (_NEE,), parts=XYZ),
+    Declared(
+        "shadow_distance",
+        "f",
+        "distance to the light",
+        (_NEE, "CLVOL_HAS_NEAR_LIGHTS"),
+        absent="INFINITY",
+    ),
+    Declared(
+        "shadow_primitive",
+        "u",
+        "primitive of the light's point",
+        (_NEE, "CLVOL_HAS_AREA"),
+        absent="NO_PRIMITIVE",
+    ),
     Declared("shadow_origin", "f", "start of the shadow ray", (_NEE, "CLVOL_HAS_SURFACES"), parts=XYZ),
     Declared(
         "shadow_inside",
@@ -141,13 +173,13 @@ PATH_STATE: tuple[Declared, ...] = (
         times="CLVOL_BOUNDARY_WORDS",
     ),
     Declared(
-        "shadow",
+        "shadow_light",
         "f",
         "light of next-event estimation, where it is not attenuated yet",
         (_NEE,),
         times="CLVOL_SPECTRUM",
     ),
-    Declared("next", "u", "queue that waits for the path when its shadow ray is through", (_NEE,)),
+    Declared("goes_on", "u", "1: the path goes on when its shadow ray is through; 0: it has ended", (_NEE,)),
     *_legs("shadow_", _NEE, _WALKS),
     Declared("shadow_medium", "u", "medium it is in", (_NEE, _WALKS, "CLVOL_HAS_MANY_MEDIA")),
     Declared("shadow_stretch", "u", "surfaces that it has passed", (_NEE, _WALKS, "CLVOL_HAS_PASSABLE")),

@@ -197,8 +197,6 @@ ENUMS = {
     "DISTRIBUTION": ("BECKMANN", "GGX"),
     "TEXTURE": ("BITMAP", "CHECKERBOARD"),
     "WRAP": ("REPEAT", "MIRROR", "CLAMP"),
-    "QUEUE": ("GENERATE", "INTERSECT", "MEDIUM", "SHADE", "SHADOW"),
-    "EVENT": ("ESCAPE", "COLLISION", "SURFACE", "WALK", "SHADOW"),
     "ABSORPTION": ("SAMPLE", "WEIGHT", "MIXED"),
     "PROBABILITY": ("HISTORY", "AVERAGE", "MAX"),
     "CONTROL": ("NEXT_JOB", "JOB_LIMIT", "NON_FINITE", "DONE"),  # DONE: one counter per pass in the ring

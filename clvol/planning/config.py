@@ -127,13 +127,7 @@ class KernelConfig:
     @property
     def stages(self) -> tuple[str, ...]:
         """Kernels of one wave, in launch order."""
-        stages = ["generate", "intersect"]
-        if self.features.media:
-            stages.append("medium_sample")
-        stages.append("shade")
-        if self.nee:
-            stages.append("shadow_transmittance")
-        return tuple(stages)
+        return layout.launched(self.macros)
 
     @cached_property
     def macros(self) -> Mapping[str, int]:

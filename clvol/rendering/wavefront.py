@@ -103,7 +103,7 @@ class Wavefront:
         sizes = {
             "render": self.render.nbytes,
             "state": 4 * len(self.fields) * self.stride,
-            "queues": 4 * len(layout.ENUMS["QUEUE"]) * self.pool.slots,
+            "queues": 4 * len(layout.QUEUES) * self.pool.slots,
             "counts": 4 * layout.COUNTER_STRIDE * self.groups,
             "control": 4 * (_DONE + self.pool.ring_passes),
             "results": 4 * self.config.channels * ring_jobs // self.config.jobs_per_sample,
@@ -275,7 +275,7 @@ class Wavefront:
         control[_NON_FINITE] = self.non_finite()  # counts over all rounds
         self._write("control", control)
         counts = np.zeros((self.groups, layout.COUNTER_STRIDE), np.uint32)
-        counts[:, len(layout.ENUMS["QUEUE"])] = self.config.group_slots  # all slots idle
+        counts[:, len(layout.QUEUES)] = self.config.group_slots  # all slots idle
         self._write("counts", counts)
 
     def _launch(self, waves: int) -> tuple[int, float]:

@@ -37,8 +37,9 @@ def start_paths(device, scene, samples):
         with_state.state = out1;
         with_state.slot_stride = count;
         start_job(&with_state, i, i);
-        out0[i] = path_pixel(&with_state, i);"""
-    probe.run(["stages/path.h", "stages/generate.h"], body, [pixel, state])
+        out0[i] = i;"""
+    probe.run(["stages/generate.h"], body, [pixel, state], stage="generate")
+    pixel = state[[f.name for f in fields].index("pixel")]
     values = {f.name: state[n].view(np.float32).astype(float) for n, f in enumerate(fields) if f.kind == "f"}
     return Started(
         np.stack([values[f"origin_{a}"] for a in "xyz"], axis=1) + probe.prepared.centre,

@@ -87,8 +87,11 @@ class Probe:
             hostbuf=render_record(self.prepared, seed),
         )
 
-    def run(self, headers, body, outputs, inputs=()):
-        """Run `body` for `outputs[0].size` work-items with index `i`; arrays are out0, …, in0, …"""
+    def run(self, headers, body, outputs, inputs=(), stage=None):
+        """Run `body` for `outputs[0].size` work-items with index `i`; arrays are out0, …, in0, …
+
+        `stage` names the stage whose functions it calls, and whose contract holds.
+        """
         names = [(f"out{n}", a) for n, a in enumerate(outputs)] + [
             (f"in{n}", a) for n, a in enumerate(inputs)
         ]
@@ -103,6 +106,7 @@ class Probe:
             f"__kernel void probe(CLVOL_ARGUMENTS{extra}, uint count)\n{{\n"
             "    const Scene scene_ = CLVOL_SCENE;\n    const Scene *scene = &scene_;\n"
             f"    const uint i = get_global_id(0);\n    if (i >= count)\n        return;\n{body}\n}}\n",
+            stage=stage and layout.stage(stage),
         )
         kernel = cl.Kernel(programs.build(self.device, source, "probe"), "probe")
         flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR

@@ -312,7 +312,6 @@ SURFACE_CODE = (
     "bsdf/",
     "texture/",
     "stages/surface_scatter",
-    "stages/hit",
     "stages/side",
 )
 MEDIUM_CODE = (

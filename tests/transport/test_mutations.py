@@ -89,7 +89,7 @@ def test_a_weight_reset_at_the_exit_is_caught(mutate):
     mutate(
         "stages/medium_sample.h",
         "    record_walk(scene, slot, tally, collision.beta, collision.emission);",
-        "    const Spectrum kept = collided ? collision.beta : get_beta(scene, slot);\n"
+        "    const Spectrum kept = collided ? collision.beta : path_beta(scene, slot);\n"
         "    record_walk(scene, slot, tally, kept, collision.emission);",
     )
     with pytest.raises(AssertionError, match="deviates"):

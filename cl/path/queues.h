@@ -1,0 +1,41 @@
+/* Path slots and queues: how stages hand paths to each other.
+
+   A work-group owns CLVOL_GROUP_SLOTS slots and its own part of every queue, so that groups never
+   wait for each other.  A queue holds slot numbers; its order is not defined and nothing depends on it.
+   Stages push by the transitions of their contracts (clvol/layout/stages.py), which are all that calls queue_push. */
+#ifndef CLVOL_PATH_QUEUES_H
+#define CLVOL_PATH_QUEUES_H
+#include "core/scene.h"
+
+INLINE __global uint *queue_counter(const Scene *scene, uint group, uint queue)
+{
+    return scene->counts + group * COUNTER_STRIDE + queue;
+}
+
+INLINE __global uint *queue_entries(const Scene *scene, uint group, uint queue)
+{
+    return scene->queues + (group * QUEUE_COUNT + queue) * CLVOL_GROUP_SLOTS;
+}
+
+/* Slots of the group that hold no path. */
+INLINE __global uint *idle_counter(const Scene *scene, uint group)
+{
+    return scene->counts + group * COUNTER_STRIDE + QUEUE_COUNT;
+}
+
+INLINE void queue_push(const Scene *scene, uint group, uint queue, uint slot)
+{
+    const uint place = atomic_inc(queue_counter(scene, group, queue));
+    queue_entries(scene, group, queue)[place] = slot;
+}
+
+/* Empties a queue once the whole group has read its length and entries; nobody pushes to the queue
+   that its own stage reads. */
+INLINE void queue_clear(const Scene *scene, uint group, uint queue)
+{
+    barrier(CLK_GLOBAL_MEM_FENCE);
+    if (get_local_id(0) == 0)
+        *queue_counter(scene, group, queue) = 0;
+}
+
+#endif

@@ -1,0 +1,264 @@
+"""The stages of a wave and the contract of each: which queue it empties, where it may hand a path on to and
+why, and which values of the path it reads and writes.
+
+What moves paths is made from this table (`clvol.layout.stage_text`): the loop over a queue that each stage's
+kernel is, the functions that hand a path on, `to_shade(scene, group, slot, EVENT_WALK)`, and those that read
+and write a path's values.  A unit has those of its stage's contract and no others: what a contract does not
+name does not compile.  A test finds what a contract names in vain.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from clvol.layout.path_state import Macros
+
+
+@dataclass(frozen=True)
+class Queue:
+    """A queue, which one stage empties in every wave.
+
+    Parameters
+    ----------
+    holds : which paths wait in it.
+    settled : no shadow ray of theirs is under way.  None may be of a path that has ended: its result is
+        written, and its slot taken by the next.
+    """
+
+    holds: str
+    settled: bool = False
+
+
+QUEUES = {
+    "GENERATE": Queue("paths that have ended", settled=True),
+    "INTERSECT": Queue("paths with a new ray", settled=True),
+    "MEDIUM": Queue("paths with media ahead on their ray"),
+    "SHADE": Queue("paths to which something happened, their event"),
+    "SHADOW": Queue("paths whose shadow ray is under way"),
+}
+IDLE = "IDLE"
+"""Where slots are that hold no path: counted, in no queue."""
+EVENTS = {
+    "ESCAPE": "the ray leaves the scene",
+    "COLLISION": "the path collides in a medium",
+    "SURFACE": "the ray meets a surface",
+    "WALK": "the walk through media goes on in the next wave",
+    "SHADOW": "the shadow ray goes on in the next wave",
+}
+
+
+@dataclass(frozen=True)
+class Transition:
+    """One way in which a stage hands a path on: the function ``to_QUEUE(scene, group, slot)`` of its unit.
+
+    Parameters
+    ----------
+    to : queue, or IDLE.
+    when : why.
+    on : events that may lead to it, of the stage that handles events.
+    sets : value of the path that is set on the way, to the function's last argument.
+    events : what that may be, where the value is the event.
+    shadow_ray : the path's shadow ray is under way still.
+    """
+
+    to: str
+    when: str
+    on: tuple[str, ...] = ()
+    sets: str = ""
+    events: tuple[str, ...] = ()
+    shadow_ray: bool = False
+
+    @property
+    def function(self) -> str:
+        """Its name in OpenCL."""
+        return f"to_{self.to.lower()}"
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage of a wave: a kernel, and the header in cl/stages/ and the function that are named like it.
+
+    Parameters
+    ----------
+    empties : the queue whose paths it handles.
+    does : what, in a sentence.
+    transitions : every way in which it hands a path on.
+    reads, writes : values of `PATH_STATE`.  Those that transitions set are not repeated.
+    needs : a macro that must be other than 0 for it to be launched.
+    wakes : function that the group calls before its loop, for slots that are in no queue.
+    stands_by : event that brings a path back in the next wave, of stages whose walks may take long: a
+        work-item that has taken its share of steps hands its other paths on with this event.  The stage's
+        function returns the steps that it took.
+    """
+
+    name: str
+    empties: str
+    does: str
+    transitions: tuple[Transition, ...]
+    reads: frozenset[str]
+    writes: frozenset[str]
+    needs: str = ""
+    wakes: str = ""
+    stands_by: str = ""
+
+    @property
+    def events(self) -> tuple[str, ...]:
+        """Events that its code names, in the order of `EVENTS`."""
+        named = {event for t in self.transitions for event in (*t.on, *t.events)}
+        return tuple(event for event in EVENTS if event in named)
+
+    @property
+    def sets(self) -> frozenset[str]:
+        """Path fields that its transitions set."""
+        return frozenset(t.sets for t in self.transitions if t.sets)
+
+
+def _fields(*words: str) -> frozenset[str]:
+    return frozenset(" ".join(words).split())
+
+
+_RAY = "origin direction"
+_KEY = "pixel sample bounce"  # of random numbers
+_COUNTS = "lookups tentative real cells violations"
+_FIRST_HIT = "depth normal albedo position met"
+_HIT = "hit_t hit_primitive hit_u hit_v"
+_PASSED = "stretch after_t after_primitive"
+_LEG = "leg walked walked_rest"
+_SHADOW_RAY = "shadow_direction shadow_distance shadow_primitive shadow_origin shadow_inside shadow_light"
+_SHADOW_LEG = (
+    "shadow_leg shadow_walked shadow_walked_rest shadow_medium "
+    "shadow_stretch shadow_after_t shadow_after_primitive"
+)
+
+STAGES = (
+    Stage(
+        "generate",
+        empties="GENERATE",
+        does="Writes a finished path's result and starts the next job's path in its slot.",
+        transitions=(
+            Transition("INTERSECT", "there is a job: a new path begins"),
+            Transition(IDLE, "there is none: the slot waits until there is"),
+        ),
+        reads=_fields("job radiance sample_weight largest_weight", _COUNTS, _FIRST_HIT),
+        writes=_fields(
+            _RAY,
+            _KEY,
+            _COUNTS,
+            _PASSED,
+            _FIRST_HIT,
+            "job beta radiance sample_weight channel pdf inside eta_squared largest_weight",
+        ),
+        wakes="wake_idle",
+    ),
+    Stage(
+        "intersect",
+        empties="INTERSECT",
+        does="Finds what lies ahead on the ray: the first surface, and whether media come before it.",
+        transitions=(
+            Transition(
+                "MEDIUM",
+                "media come first; the event is what lies behind them",
+                sets="event",
+                events=("ESCAPE", "SURFACE"),
+            ),
+            Transition("SHADE", "none do", sets="event", events=("ESCAPE", "SURFACE")),
+        ),
+        reads=_fields(_RAY, _PASSED, "bounce inside hit_t"),
+        writes=_fields(_HIT, "inside origin interval_end"),
+    ),
+    Stage(
+        "medium_sample",
+        empties="MEDIUM",
+        does="Walks the media ahead to a collision, or to the surface or infinity behind them.",
+        transitions=(
+            Transition(
+                "SHADE",
+                "a collision; the walk needs another wave; or what lies behind, the event as it is",
+                sets="event",
+                events=("COLLISION", "WALK"),
+            ),
+        ),
+        reads=_fields(
+            _RAY,
+            _KEY,
+            _COUNTS,
+            _LEG,
+            "event channel beta radiance inside stretch after_t hit_t interval_end largest_weight exhausted",
+        ),
+        writes=_fields(_COUNTS, _LEG, "origin medium beta radiance largest_weight exhausted"),
+        needs="CLVOL_HAS_MEDIA",
+        stands_by="WALK",
+    ),
+    Stage(
+        "shade",
+        empties="SHADE",
+        does="Handles what happened to a path: gathers light, scatters it, and makes a shadow ray.",
+        transitions=(
+            Transition(
+                "MEDIUM",
+                "the walk goes on",
+                on=("WALK",),
+                sets="event",
+                events=("ESCAPE", "SURFACE"),
+            ),
+            Transition(
+                "SHADOW",
+                "there is a shadow ray, which the path waits for",
+                on=("COLLISION", "SURFACE", "SHADOW"),
+                sets="goes_on",
+                shadow_ray=True,
+            ),
+            Transition("INTERSECT", "the path goes on", on=("COLLISION", "SURFACE")),
+            Transition("GENERATE", "it ended", on=("ESCAPE", "COLLISION", "SURFACE")),
+        ),
+        reads=_fields(
+            _RAY,
+            _KEY,
+            _HIT,
+            "event goes_on channel beta radiance pdf medium stretch inside eta_squared sample_weight",
+            "largest_weight cut cut_energy exhausted",
+        ),
+        writes=_fields(
+            _RAY,
+            _PASSED,
+            _SHADOW_RAY,
+            _FIRST_HIT,
+            "bounce beta radiance pdf inside eta_squared",
+            "largest_weight cut cut_energy exhausted",
+        ),
+    ),
+    Stage(
+        "shadow_transmittance",
+        empties="SHADOW",
+        does="Attenuates the light of a shadow ray by everything on its way and adds what arrives.",
+        transitions=(
+            Transition(
+                "SHADE",
+                "the walk needs another wave",
+                sets="event",
+                events=("SHADOW",),
+                shadow_ray=True,
+            ),
+            Transition("INTERSECT", "the light is through, and the path goes on"),
+            Transition("GENERATE", "the light is through, and the path has ended"),
+        ),
+        reads=_fields(_KEY, _COUNTS, _SHADOW_RAY, _SHADOW_LEG, "origin goes_on channel radiance exhausted"),
+        writes=_fields(_COUNTS, _SHADOW_LEG, "shadow_inside shadow_light radiance exhausted"),
+        needs="CLVOL_NEE",
+        stands_by="SHADOW",
+    ),
+)
+"""In the order of their launches in a wave: a path that nothing holds up goes from a new ray to the next
+one in one wave.  No stage pushes to the queue that it empties: walks that need another go through `shade`."""
+
+
+def stage(name: str) -> Stage:
+    """The stage of that name."""
+    return next(s for s in STAGES if s.name == name)
+
+
+def launched(macros: Macros) -> tuple[str, ...]:
+    """Names of the stages that a wave launches, in order."""
+    return tuple(s.name for s in STAGES if not s.needs or macros[s.needs])
