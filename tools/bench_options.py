@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bench_cloud
 import click
 from documents import writable
 from scene_options import choice_options
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 
 def json_option(command: Callable) -> Callable:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bench_tables import Figures, ranged, show
 from efficiency import spread
-from scene_options import OpenScene
+
+if TYPE_CHECKING:
+    from scene_options import OpenScene
 
 
 def measure_pool(opened: OpenScene, sizes: list[int], spp: int, rounds: int) -> Figures:

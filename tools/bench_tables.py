@@ -5,10 +5,8 @@ from __future__ import annotations
 import json
 import os
 import platform
-from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from documents import write
@@ -16,6 +14,10 @@ from rich.console import Console
 from rich.table import Table
 
 from clvol.version import __version__
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
 
 Figures = dict[str, Any]
 NO_AIM = "–"

@@ -1,4 +1,4 @@
-"""Is one chromatic render worth more than three grey ones?  And does a white medium throw fireflies?
+"""Whether one chromatic render is worth more than three grey ones, and a white medium throws fireflies.
 
 A cloud whose extinction is 60, 30, 10 and whose albedo is 0.95, 0.9, 0.8 in red, green and blue, under a
 white sky: the default technique against delta tracking of each channel by itself, by turns.  Three grey

@@ -11,8 +11,8 @@ import shlex
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bench
 import click
@@ -23,6 +23,9 @@ from documents import between, writable, write
 from pilot import SCENES, pilot_options, tested
 
 from clvol.cli.messages import OneLineErrors
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 DOCS = ROOT / "docs"
 PERFORMANCE = DOCS / "performance.md"

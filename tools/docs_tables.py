@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import platform
 import re
-from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bench
 import click
@@ -17,9 +17,13 @@ from pilot import HEADER, HOPELESS, Tested
 
 import clvol
 from clvol.device.device import open_device
-from clvol.lab.comparison.figures import Figures
-from clvol.lab.comparison.result import Comparison
 from clvol.planning.registry import TECHNIQUES, TRANSMITTANCES
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from clvol.lab.comparison.figures import Figures
+    from clvol.lab.comparison.result import Comparison
 
 SMALL = {"width": 48, "height": 64}
 SCENES = {

@@ -7,11 +7,14 @@ python tools/lowest.py > lowest.txt && pip install -c lowest.txt '.[test]'
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 import click
 from folders import ROOT
 from packaging.requirements import Requirement
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
 
 PROJECT = ROOT / "pyproject.toml"
 

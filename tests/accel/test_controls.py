@@ -1,5 +1,7 @@
-"""Controls keep the inequalities that make decomposition and residual tracking unbiased and bounded, and
-kd-trees carry and weigh them by leaf."""
+"""Controls keep what makes decomposition and residual tracking unbiased and bounded.
+
+Kd-trees carry and weigh them by leaf.
+"""
 
 import numpy as np
 import pytest

@@ -40,7 +40,7 @@ def test_an_unknown_choice_of_the_scene_is_refused_too():
 
 
 @pytest.mark.parametrize(
-    "options, message",
+    ("options", "message"),
     [
         ({"spp": 0}, "cannot render 0 samples per pixel"),
         ({"spp": -3}, "cannot render -3 samples per pixel"),

@@ -7,8 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import OpenImageIO as oiio  # noqa: N813
@@ -21,6 +20,10 @@ from clvol import api
 from clvol.base import interrupts, output_files
 from clvol.base.progress import Progress, RichProgress
 from clvol.cli.main import main
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 SCENE = """<scene version="3.0.0"><sensor type="perspective"><film type="hdrfilm">

@@ -143,8 +143,7 @@ def triangles_of(shape):
 
 
 def crossings(shape, o, d):
-    """Parameters (rays, k) of the crossings of each line, inf where there are no more, and their sign: +1
-    inwards."""
+    """Parameters (rays, k) of each line's crossings, inf where there are no more; and +1 inwards, -1 out."""
     if shape.kind == "sphere":
         inverse = np.linalg.inv(shape.to_world)
         p, v = o @ inverse[:3, :3].T + inverse[:3, 3], d @ inverse[:3, :3].T

@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import blosc
 import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 MAGIC = 0x56444220
 ZIP, ACTIVE_MASK, BLOSC = 1, 2, 4
@@ -45,7 +48,7 @@ class GridSpec:
 
     @property
     def letter(self) -> str:
-        """struct letter of a value at full width."""
+        """Struct letter of a value at full width."""
         return LETTERS[self.value_type]
 
     @property

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from clvol.volumes.grid import SparseGrid
+if TYPE_CHECKING:
+    from clvol.volumes.grid import SparseGrid
 
 
 def samples_in_box(grid: SparseGrid, lower, upper) -> np.ndarray:

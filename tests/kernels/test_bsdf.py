@@ -238,8 +238,11 @@ def test_delta_lobes_are_mitsubas(probe, name):
 
 
 def test_what_passes_straight_on(probe):
-    """Null and the transmission of a pane; Mitsuba's eval_null_transmission of the masked pane is 0.7 + 0.3
-    times that of the pane, 0.9088304 of the light at this angle."""
+    """Null and the transmission of a pane.
+
+    Mitsuba's eval_null_transmission of the masked pane is 0.7 + 0.3 times that of the pane, 0.9088304 of the
+    light at this angle.
+    """
     wi = unit(0.5, 0.2, 0.6)
     pane, opacity = probe.null(probe.number["masked pane"], wi)
     assert np.allclose(opacity, 0.3)

@@ -26,7 +26,7 @@ def quadric_caster(device, kind, world_from_local=None):
 
 
 def expected_quadric_hits(kind, o, d):
-    """t of both crossings in float64, (rays, 2), sorted, inf for none; and how nearly they are not hits."""
+    """Both crossings' t in float64, (rays, 2), sorted, inf for none; and how nearly they are not hits."""
     o, d = o.astype(np.float64), d.astype(np.float64)
     if kind == "disk":
         t = -o[:, 2] / d[:, 2]

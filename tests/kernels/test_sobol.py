@@ -35,7 +35,7 @@ def numbers(dimension, index):
 
 
 def test_direction_numbers_are_those_of_scipy():
-    """scipy goes in Gray code's order: its number 2^k has the columns k and k - 1."""
+    """SciPy goes in Gray code's order: its number 2^k has the columns k and k - 1."""
     engine = qmc.Sobol(sobol.DIMENSIONS, scramble=False, bits=32)
     before = np.zeros(sobol.DIMENSIONS, np.uint32)
     for k in range(21):
@@ -173,16 +173,21 @@ def test_samples_of_a_randomisation_take_a_stratum_each(probe, first):
 
 
 def imbalance(one, other):
-    """Variance, over pixels, of the share of samples in which two numbers lie in the same half, over that of
-    independent samples; uint32 (pixels, samples) each."""
+    """Variance, over pixels, of the share of samples in which two numbers lie in the same half.
+
+    Over that of independent samples; uint32 (pixels, samples) each.
+    """
     same = (one ^ other) >> np.uint32(31) == 0
     return 4 * same.shape[1] * same.mean(axis=1).var()
 
 
 @pytest.mark.parametrize("count", [8, 16, 64])
 def test_decisions_of_different_blocks_meet_at_random(probe, count):
-    """Samples 2n and 2n + 1 differ in their first digits everywhere, so that a pair of numbers is drawn half
-    as often as there are samples, at worst.  In one order for all blocks it would be drawn once."""
+    """Samples 2n and 2n + 1 differ in their first digits everywhere.
+
+    So a pair of numbers is drawn half as often as there are samples, at worst.  In one order for all blocks
+    it would be drawn once.
+    """
     probe.upload()
     pixels = np.arange(1500)[:, None]
     drawn = [blocks(probe, pixels, of_one(1, count), **place) for place in PLACES]

@@ -66,7 +66,7 @@ def sampled(rng):
     return rng.normal(1.0, 0.01, (4, 16, 16, 1))
 
 
-@pytest.mark.parametrize("chance, known", [(1.0, 0.0), (0.1, 1 / CHANCE)])
+@pytest.mark.parametrize(("chance", "known"), [(1.0, 0.0), (0.1, 1 / CHANCE)])
 def test_rare_samples_that_were_missed_are_no_alarm(chance, known, monkeypatch):
     """Tiles without a hit, where others have some; and pictures without any, if one is known to be large."""
     rng = np.random.default_rng(7)
@@ -138,7 +138,7 @@ def test_values_that_are_not_finite_never_agree():
 
 
 @pytest.mark.parametrize(
-    "a, b, options",
+    ("a", "b", "options"),
     [
         ((1, 4, 4, 3), (4, 4, 4, 3), {}),
         ((2, 4, 4, 3), (2, 4, 5, 3), {}),

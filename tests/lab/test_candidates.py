@@ -34,15 +34,17 @@ def test_halving_keeps_the_better_half_and_counts_precomputation():
 
 
 def lamp(chance, rounds=4, seed=5, base=0.0, noise=0.0, mean=1.0, seconds=1.0):
-    """A candidate that finds a lamp by chance: hits in so many pixels of a round, of the given mean; beside
-    it a base with noise."""
+    """A candidate that finds a lamp by chance: hits in so many pixels of a round, of the given mean.
+
+    Beside it stands a base with noise.
+    """
     rng = np.random.default_rng(seed)
     hits = (rng.random((rounds, 32, 32, 1)) < chance) * (mean / chance) * np.ones(3)
     images = list(hits + base + rng.normal(0, noise, hits.shape))
     return Candidate(f"{chance}", None, images, [seconds] * rounds)
 
 
-@pytest.mark.parametrize("chance, hits", [(1.0, 4096), (0.1, 1), (1e-3, 1)])
+@pytest.mark.parametrize(("chance", "hits"), [(1.0, 4096), (0.1, 1), (1e-3, 1)])
 @pytest.mark.parametrize("base", [0.0, 0.5])
 def test_who_missed_a_rare_light_does_not_win(chance, hits, base):
     """Its rounds have no scatter, and take half the time; it loses both to auto's choice and as auto's."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -34,6 +34,9 @@ from clvol.lab.statistics import Interval
 from clvol.layout import RANDOMIZATIONS
 from clvol.picture.image_io import encode_exr, split_channels
 from clvol.planning.registry import FAMILIES
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 FALSE_ALARM = 1e-4
 SIZE = 16
@@ -247,8 +250,11 @@ def rare(random: np.random.Generator, spp: int) -> np.ndarray:
 
 
 def test_rare_bright_samples_are_no_bias_against_a_given_reference(tmp_path: Path) -> None:
-    """Four samples of each pixel against thousands: a third of such pictures have seen no bright one, and are
-    certain of what they lack unless told by how many samples the reference is ahead."""
+    """Four samples of each pixel against thousands.
+
+    A third of such pictures have seen no bright one, and are certain of what they lack unless told by how
+    many samples the reference is ahead.
+    """
     random, scene, spp = np.random.default_rng(3), film_only(), 1024
     rounds = np.stack([rare(random, spp) for _ in range(16)])
     truth = Reference.of_rounds(rounds, spp, "made up")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -18,14 +19,16 @@ import clvol
 from clvol.lab.comparison.figures import LEVEL, Figures, compute_figures
 from clvol.lab.comparison.measure import Measured
 from clvol.lab.comparison.reference import Reference
-from clvol.lab.comparison.result import Comparison
 from clvol.lab.comparison.shorter import render_slope
 from clvol.lab.efficiency import error_products, fitted_slope
-from clvol.lab.statistics import Interval
 from clvol.lab.trials import Trial
 from clvol.planning.choices import Choices
 from clvol.planning.registry import TECHNIQUES
 from clvol.scene.records import ConstantEmitter, Scene
+
+if TYPE_CHECKING:
+    from clvol.lab.comparison.result import Comparison
+    from clvol.lab.statistics import Interval
 
 pytestmark = pytest.mark.contract
 
@@ -51,8 +54,10 @@ LEVEL_OF_ONE = 1 - sidak(JOINT_RATE, 2 * len(UNBIASED))
 
 @pytest.fixture(scope="module")
 def comparison(tmp_path_factory: pytest.TempPathFactory) -> Comparison:
-    """Every technique, marching in steps as long as the cube, against a reference with a twelfth of the
-    variance of their rounds' means."""
+    """Every technique, marching in steps as long as the cube, against a reference.
+
+    That has a twelfth of the variance of their rounds' means.
+    """
     path, scene = tmp_path_factory.mktemp("reference") / "reference.exr", cube(20)
     clvol.render(scene, spp=2048, technique="regular", sampler="sobol", seed=10**9).save(path)
     with pytest.MonkeyPatch.context() as patch:
@@ -82,8 +87,10 @@ def slopes(figures: Figures, reference: Reference, level: float, bright: float =
 
 
 def test_without_bias_errors_fall_with_slope_minus_one(comparison: Comparison) -> None:
-    """Over renders and over samples, for every unbiased technique, in bands narrow enough to mean something;
-    of pictures a twentieth too bright they would not hold -1."""
+    """Over renders and over samples, for every unbiased technique.
+
+    In bands narrow enough to mean something: of pictures a twentieth too bright they would not hold -1.
+    """
     for name in UNBIASED:
         figures = comparison[name]
         assert figures.verdict.agrees, figures.verdict
@@ -129,8 +136,11 @@ def truth(device) -> Reference:
 
 @pytest.fixture(scope="module", params=["independent", "sobol"])
 def with_itself(request: pytest.FixtureRequest, device, truth: Reference) -> Compared:
-    """Forty comparisons of delta under three names, each of renders of its own; the seconds are made up, with
-    noise of each render and more of each round.  Called with the factor by which those of c are too many."""
+    """Forty comparisons of delta under three names, each of renders of its own.
+
+    The seconds are made up, with noise of each render and more of each round. Called with the factor by which
+    those of c are too many.
+    """
     spp = 4
     trial = Trial.open(device, cube(SMALL), Choices(technique="delta", sampler=request.param))
     trial = replace(trial, precompute_seconds=0.1)
@@ -159,8 +169,10 @@ def with_itself(request: pytest.FixtureRequest, device, truth: Reference) -> Com
 
 
 def test_a_technique_does_not_differ_significantly_from_itself(with_itself: Compared) -> None:
-    """At most so many of forty comparisons call b or c different as a rate of 5 % allows, by either cost; a
-    false alarm of the four counts, two for each sampler, once in 10,000."""
+    """At most so many of forty comparisons call b or c different as a rate of 5 % allows, by either cost.
+
+    A false alarm of the four counts, two for each sampler, once in 10,000.
+    """
     found, most = with_itself(1.0), stats.binom.isf(FALSE_ALARM / 4, REPEATS, LEVEL)
     for cost in ("seconds", "lookups"):
         family = [[f.efficiency[cost] for f in figures[1:]] for figures in found]

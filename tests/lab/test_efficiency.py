@@ -210,8 +210,10 @@ def test_holm_steps_down_and_leaves_the_unknown_out() -> None:
 
 
 def test_a_family_of_equals_holds_a_significant_one_no_more_often_than_stated() -> None:
-    """Three against one baseline, of 5 rounds each: adjusted p-values keep the rate of all three together,
-    single ones do not."""
+    """Three against one baseline, of 5 rounds each.
+
+    Adjusted p-values keep the rate of all three together, single ones do not.
+    """
     random, comparisons, level = np.random.default_rng(11), 1000, 0.05
     adjusted = single = 0
     for _ in range(comparisons):

@@ -46,7 +46,7 @@ UNEQUAL = [
 
 @pytest.mark.parametrize("counts", [(16, 16, 16, 16), *UNEQUAL])
 def test_the_estimate_is_the_means_variance_whatever_the_variance_of_each_randomisation(counts):
-    """m = Σ n_r m_r / N has the variance Σ (n_r / N)² v_r."""
+    """The mean m = Σ n_r m_r / N has the variance Σ (n_r / N)² v_r."""
     expected = (np.array(counts) / sum(counts)) ** 2
     np.testing.assert_allclose(shares_of_variance(counts), expected, rtol=1e-12)
     means = np.random.default_rng(2).random((len(counts), 3))

@@ -8,9 +8,9 @@ import resource
 import shutil
 import stat
 import tempfile
-from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import OpenImageIO as oiio  # noqa: N813
@@ -27,6 +27,9 @@ from clvol.picture import image_io
 from clvol.picture.estimate import Moments
 from clvol.picture.result import Result
 from clvol.picture.saving import check_disk
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
 
 SCENE = """<scene version="3.0.0"><sensor type="perspective"><film type="hdrfilm">
 <integer name="width" value="64"/><integer name="height" value="64"/></film></sensor>

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import OpenImageIO as oiio  # noqa: N813
@@ -14,6 +14,9 @@ from clvol.picture import image_io
 from clvol.picture.estimate import Moments
 from clvol.picture.merging import merge
 from clvol.picture.result import Result, relative_noise
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 HEIGHT, WIDTH = 5, 7
 

@@ -1,5 +1,7 @@
-"""The worked example of a technique in docs/contributing.md compiles, is right, and shows so in `clvol ray`;
-where it is too noisy to be judged, the tests of techniques say so."""
+"""The worked example of a technique in docs/contributing.md compiles, is right, and shows so in `clvol ray`.
+
+Where it is too noisy to be judged, the tests of techniques say so.
+"""
 
 import re
 

@@ -1,5 +1,8 @@
-"""What the documentation promises: tables name every choice and plugin, files and links lead somewhere, the
-examples run, and what comments cite is there."""
+"""What the documentation promises.
+
+Tables name every choice and plugin, files and links lead somewhere, the examples run, and what comments cite
+is there.
+"""
 
 from __future__ import annotations
 

@@ -6,12 +6,15 @@ Which room may import which is import-linter's part (`lint-imports`, contracts i
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from places import ROOT
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
 
 CLVOL = ROOT / "clvol"
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import importlib
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from places import SCENES, TOOLS
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 CLOUD = SCENES / "cloud.vol"
 

@@ -1,5 +1,7 @@
-"""A scene is what it was when it was loaded, whatever becomes of its files and arrays; what changes while it
-is read, and what is no file, is one clear error."""
+"""A scene is what it was when it was loaded, whatever becomes of its files and arrays.
+
+What changes while it is read, and what is no file, is one clear error.
+"""
 
 from __future__ import annotations
 
@@ -142,7 +144,8 @@ def test_a_file_written_to_while_it_is_read_is_an_error(tmp_path, monkeypatch, s
 def test_a_vdb_cut_while_it_is_read_is_an_error(tmp_path):
     path = tmp_path / "a.vdb"
     path.write_bytes(FIRE.read_bytes())
-    with pytest.raises(VolumeError, match="are gone since it was opened"), open_vdb(path) as stream:
+    gone = "are gone since it was opened"
+    with pytest.raises(VolumeError, match=gone), open_vdb(path) as stream:  # noqa: PT012 (it closes the file too)
         stream.take(100)
         os.truncate(path, 1000)
         stream.skip(2 * WINDOW)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import OpenImageIO as oiio  # noqa: N813
@@ -15,6 +15,9 @@ from clvol.errors import OptionError, SceneError
 from clvol.lab.comparison.reference import read_reference
 from clvol.picture.image_io import encode_exr, split_channels
 from clvol.scene.image import read_image
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 SIZE = 16
 FILM = SimpleNamespace(film=SimpleNamespace(window=(0, 0, SIZE, SIZE)))

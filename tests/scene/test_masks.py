@@ -1,5 +1,8 @@
-"""Masked arrays: what is masked has no value.  A volume is empty there; pictures, colours and transforms need
-every value.  And values that rounding put a little above their maximum."""
+"""Masked arrays: what is masked has no value.
+
+A volume is empty there; pictures, colours and transforms need every value.  Also values that rounding put a
+little above their maximum.
+"""
 
 from __future__ import annotations
 

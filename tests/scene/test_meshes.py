@@ -103,7 +103,7 @@ def test_an_obj_whose_corners_differ_is_read_corner_by_corner(mesh):
 
 
 def test_hard_edges_of_an_obj_stay_hard(mesh):
-    """trimesh would keep one normal for a position."""
+    """Trimesh would keep one normal for a position."""
     data = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 -2\nvn 0 -1 0\nf 1//1 3//1 2//1\nf 1//2 2//2 4//2\n"
     normals = corners(mesh(data, "obj"), "normals")
     np.testing.assert_array_equal(normals, np.repeat([[(0, 0, -1)], [(0, -1, 0)]], 3, axis=1))
@@ -174,7 +174,7 @@ def test_normals_of_a_ply_with_texture_coordinates_stay_with_their_vertices(mesh
 
 @pytest.mark.parametrize("order", ["<", ">"])
 def test_a_binary_ply_may_mix_triangles_and_other_polygons(mesh, order):
-    """trimesh reads none that does."""
+    """Trimesh reads none that does."""
     name = {"<": "binary_little_endian", ">": "binary_big_endian"}[order]
     header = ply_header(5, 2, name, ("x", "y", "z", "nx", "ny", "nz", "u", "v"))
     header = header.replace(b"property list", b"property uchar flags\nproperty list").replace(

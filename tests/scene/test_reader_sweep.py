@@ -1,5 +1,7 @@
-"""Nothing that a scene says is dropped: every parameter of every plugin changes what is made of the scene, is
-known to change no expected image, or is refused; and so is every plugin inside of another.
+"""Nothing that a scene says is dropped.
+
+Every parameter of every plugin changes what is made of the scene, is known to change no expected image, or is
+refused; and so is every plugin inside of another.
 
 `plugin_parameters` has a table of every plugin in `clvol.scene.loader.PLUGINS`.  Who adds a plugin says there
 what each parameter does: another value that must show in the records, or that it is silent.

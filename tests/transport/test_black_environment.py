@@ -13,7 +13,7 @@ PLACE = np.array([0.2, 1.2, 1.3])
 
 @pytest.mark.parametrize("intensity", [0.0, 3.0], ids=["alone", "beside a lamp"])
 def test_an_environment_map_of_zero_is_black(intensity):
-    """A floor in it shows what a point light gives: 0.6 / pi I cos / d².  (Mitsuba 3.9.1: black too.)"""
+    """A floor in it shows what a point light gives, 0.6 / pi I cos / d²; it is black in Mitsuba 3.9.1 too."""
     floor = Shape("rectangle", np.diag([9.0, 9.0, 1.0, 1.0]), bsdf=Diffuse((0.6,)))
     lights = [
         EnvmapEmitter(np.zeros((4, 8, 3), np.float32), np.eye(4)),

@@ -57,8 +57,10 @@ def show(shapes, spp=SPP, seed=1, **view):
 
 
 def pictured(shapes, seed=1, bias=0.01, **view):
-    """Result and oracle, with the paths it takes: each arrives or does not, which is all there is of
-    variance."""
+    """Result and oracle, with the paths it takes.
+
+    Each arrives or does not, which is all there is of variance.
+    """
     answer = seen_sky(sampled(shapes, **view), shapes)
     share = answer.mean()
     paths = (1 - share) / share * (2.2 * largest_z(1) / bias) ** 2
@@ -185,7 +187,7 @@ def test_masks_that_hold_nothing_are_noticed(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "old, new, view",
+    ("old", "new", "view"),
     [
         ("dot(ng, d) < 0.0f", "dot(ng, d) > 0.0f", {"fov": 16.0}),
         ("inside->word[shape->boundary >> 5] |= bit", "(void)bit", {"fov": 16.0}),
@@ -302,8 +304,10 @@ FLAWS = ["open", "inconsistent", "inside out", "turned by flip_normals"]
 
 @pytest.mark.parametrize("kind", FLAWS)
 def test_a_flawed_mesh_neither_makes_light_nor_loses_it_nor_keeps_a_path(kind):
-    """Where nothing absorbs, every path reaches the white sky in the end, with all of its weight; but for
-    those that meet the black ball inside, which no light passes."""
+    """Where nothing absorbs, every path reaches the white sky in the end, with all of its weight.
+
+    All but those that meet the black ball inside, which no light passes.
+    """
     shape = meshed(_flawed(kind), homogeneous(2.0, 1.0), flip_normals=kind == "turned by flip_normals")
     wide = {"fov": 60.0, "size": (12, 12)}
     alone = render(found([shape], **wide), spp=256, seed=1, transmittance="none", majorant="grid")

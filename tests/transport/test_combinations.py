@@ -1,5 +1,7 @@
-"""One picture, whatever the combination: a set that covers every pair of technique, transmittance, majorant,
-look-up and absorption, each picture against all the others.
+"""One picture, whatever the combination.
+
+A set covers every pair of technique, transmittance, majorant, look-up and absorption; each picture is
+compared with all the others.
 
 Tiles are compared by Welch's test with Holm's correction, image means against the mean of all other pictures;
 the false-alarm rate of each test is 1e-4, at fixed seeds, and a bias of 0.5 % of any one picture is seen.
@@ -30,8 +32,10 @@ def linear(technique, transmittance):
 
 
 def covering_set():
-    """Every technique with every transmittance; the rest by residues, so that few kernels are built: three or
-    four of each technique, three or four of each transmittance."""
+    """Every technique with every transmittance; the rest by residues, so that few kernels are built.
+
+    Three or four of each technique, three or four of each transmittance.
+    """
     chosen = []
     for (i, technique), (j, transmittance) in itertools.product(
         enumerate(TECHNIQUES), enumerate(TRANSMITTANCES)
@@ -111,7 +115,7 @@ def tile_p_values(results):
 
 
 def mean_deviations(results):
-    """z of each picture's mean against the weighted mean of all others, and the relative errors."""
+    """The z of each picture's mean against the weighted mean of all others, and the relative errors."""
     means, variances = (np.array(x) for x in zip(*(image_mean(r) for r in results), strict=True))
     z, error = np.empty_like(means), np.empty_like(means)
     for k in range(len(means)):

@@ -1,5 +1,7 @@
-"""Large surfaces that pass near the scene's centre, where coordinates are small and what they were computed
-from is not: a ray that leaves one does not meet it again."""
+"""Large surfaces that pass near the scene's centre: a ray that leaves one does not meet it again.
+
+Coordinates are small there, and what they were computed from is not.
+"""
 
 import numpy as np
 import pytest

@@ -1,5 +1,6 @@
-"""Side by side with Mitsuba 3.9: both load the same files, and their pictures agree in every tile and on the
-mean.
+"""Side by side with Mitsuba 3.9.
+
+Both load the same files, and their pictures agree in every tile and on the mean.
 
 Runs when asked for: ``pytest --mitsuba tests/transport/test_mitsuba.py``, which installs Mitsuba in
 an environment of its own, unless CLVOL_MITSUBA names a Python that has it.

@@ -165,8 +165,10 @@ def test_a_film_too_large_for_the_device_is_a_clear_error():
 
 
 def test_the_last_filter_sample_at_the_films_edge_is_still_on_the_film():
-    """Cut filters are inverted up to their last bin, whose width may round to nothing; sample 1572998 of
-    a corner column draws it."""
+    """Cut filters are inverted up to their last bin, whose width may round to nothing.
+
+    Sample 1572998 of a corner column draws it.
+    """
     film = Film(16, 16, ReconstructionFilter("gaussian", 7.24, 1.81))
     scene = replace(
         scene_of(medium_of(1.0)), film=film, emitters=(EnvmapEmitter(np.ones((3, 2, 3)), np.eye(4)),)

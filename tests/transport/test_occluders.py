@@ -188,8 +188,10 @@ def test_a_lamp_does_not_hide_itself(kind):
 
 
 def test_a_fine_mesh_does_not_hide_itself():
-    """Triangles of a millimetre, a hundred metres from the origin: one ray of twenty meets a neighbour of the
-    triangle that it was sent to, just before or just behind."""
+    """Triangles of a millimetre, a hundred metres from the origin.
+
+    One ray of twenty meets a neighbour of the triangle that it was sent to, just before or just behind.
+    """
     light, irradiance = geodesic(0.05, 3.0, 5)
     found = floor_radiance(light, 3.0, shift=100.0, samples=65536)
     assert_mean(found, irradiance)

@@ -27,8 +27,11 @@ CASES = [(kind, *pair) for kind in ("grey", "mixed") for pair in PAIRS]
 
 
 class Layers:
-    """Three slabs across z that overlap, two by two and all at once: two grids whose density varies with
-    z, and a homogeneous one.  Of the `mixed` ones two are chromatic and one is grey."""
+    """Three slabs across z that overlap, two by two and all at once.
+
+    They are two grids whose density varies with z, and a homogeneous one.  Of the `mixed` ones two are
+    chromatic and one is grey.
+    """
 
     spans = ((0.0, 1.0), (0.3, 1.5), (0.6, 2.0))
     profiles = ((0.2, 1.0, 0.1, 0.6), (1.0, 0.3, 0.8), (1.0,))
@@ -63,7 +66,7 @@ class Layers:
         return found
 
     def sigma(self, n, z):
-        """(len(z), channels)"""
+        """The extinction of slab n at depths z, (len(z), channels)."""
         (lower, upper), profile = self.spans[n], self.profiles[n]
         place = (z - lower) / (upper - lower)
         index = np.clip((place * len(profile)).astype(int), 0, len(profile) - 1)
@@ -170,7 +173,7 @@ def test_a_medium_that_is_not_added_is_noticed():
 
 
 def test_weights_that_are_not_multiplied_are_noticed(monkeypatch):
-    """The walk that wins keeps its own weight alone. (Without any repetition the mean stays right.)"""
+    """The walk that wins keeps its own weight alone; without any repetition the mean stays right."""
     original = programs.kernel_source
     repeated = "pass == 1 && part.medium == winner"
 
@@ -183,6 +186,6 @@ def test_weights_that_are_not_multiplied_are_noticed(monkeypatch):
 
     monkeypatch.setattr(programs, "kernel_source", source)
     layers = Layers("mixed")
+    result = once(layers, technique="spectral", transmittance="ratio")
     with pytest.raises(AssertionError, match="deviates"):
-        result = once(layers, technique="spectral", transmittance="ratio")
         assert_matches(result, layers.answer(4.0), bias=0.01)

@@ -83,13 +83,15 @@ def test_in_glass_no_light_can_be_sampled_and_every_path_weighs_one():
 
 
 @pytest.mark.parametrize(
-    "medium, known, uncertain",
+    ("medium", "known", "uncertain"),
     [(None, 0.98109, 0.00009), (MILK, 0.94195, 0.00023)],
     ids=["clear", "milky"],
 )
 def test_rough_glass_loses_what_scatters_twice_at_its_facets(medium, known, uncertain):
-    """Mean of the picture and its standard error as Mitsuba 3.9.1 has them: volpath, scalar_rgb, without
-    roulette, 8 renders of 8192 samples a pixel."""
+    """Mean of the picture and its standard error as Mitsuba 3.9.1 has them.
+
+    By volpath, scalar_rgb, without roulette, 8 renders of 8192 samples a pixel.
+    """
     shape = surfaced(ball((0, 0, 0), 1.0, medium), RoughDielectric(1.5, 1.0, "ggx", 0.1, 0.1))
     mean, error = mean_and_error(show(found([shape], fov=14.0), spp=3 << 12))
     error = np.hypot(error[0], uncertain)
@@ -99,8 +101,10 @@ def test_rough_glass_loses_what_scatters_twice_at_its_facets(medium, known, unce
 
 @pytest.mark.contract
 def test_a_half_space_behind_smooth_glass_reflects_what_giovanelli_says():
-    """n 1.5, albedo 0.9, isotropic: 0.2600 at normal incidence, 0.0400 of it specular (NUMBERS.md).  By
-    reciprocity, what is seen along the normal under a uniform sky; nothing gets through the slab."""
+    """With n 1.5, albedo 0.9, isotropic: 0.2600 at normal incidence, 0.0400 of it specular (NUMBERS.md).
+
+    By reciprocity, what is seen along the normal under a uniform sky; nothing gets through the slab.
+    """
     slab = surfaced(box((-300, -300, 0), (300, 300, 40.0), homogeneous(1.0, 0.9)), GLASS)
     scene = found([slab], eye=(0.1, 0.2, -5.0), target=(0.1, 0.2, 0.0), fov=0.01, size=(2, 2))
     result = show(scene, spp=3 << 18, seed=3)

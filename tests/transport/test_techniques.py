@@ -1,5 +1,6 @@
-"""Pictures by every unbiased technique against answers nobody here rendered: furnaces, published slabs and
-half-spaces, closed forms of emission.
+"""Pictures by every unbiased technique against answers nobody here rendered.
+
+Furnaces, published slabs and half-spaces, closed forms of emission.
 
 The transmittances take turns, so that each goes with some technique here.  Unless a test says otherwise its
 false-alarm rate is 1e-4, at fixed seeds.  A picture alone shows a bias of about 1 %; pictures are pooled over
@@ -66,7 +67,7 @@ def furnaces(technique, transmittance, absorption, colours):
 
 @pytest.mark.contract
 @pytest.mark.parametrize("colours", COLOURS)
-@pytest.mark.parametrize("technique, transmittance, absorption", FURNACES)
+@pytest.mark.parametrize(("technique", "transmittance", "absorption"), FURNACES)
 def test_nothing_shows_in_a_furnace(technique, transmittance, absorption, colours):
     for result in furnaces(technique, transmittance, absorption, colours):
         assert_matches(result, SKY, bias=0.012)
@@ -99,7 +100,7 @@ def narrow(medium, **keywords):
     )
 
 
-@pytest.mark.parametrize("sigma, radiance", [(1.3, 2.0), ((2.0, 1.0, 0.2), (1.0, 2.0, 3.0))])
+@pytest.mark.parametrize(("sigma", "radiance"), [(1.3, 2.0), ((2.0, 1.0, 0.2), (1.0, 2.0, 3.0))])
 def test_a_homogeneous_absorbing_emitter_is_its_closed_form(sigma, radiance):
     """L_e (1 - exp(-sigma L)), from homogeneous media, which need no technique."""
     medium = homogeneous(sigma, 0.0)
@@ -114,8 +115,10 @@ TINTS = {"grey": (1.0,), "coloured": (2.0, 1.0, 0.4)}
 
 @functools.cache
 def ramp(technique, transmittance, absorption, colours):
-    """A density that grows linearly along the view, and what it shows: tau = (s0 + s1) L / 2, clamped ends
-    added."""
+    """A density that grows linearly along the view, and what it shows: tau = (s0 + s1) L / 2, ends added.
+
+    The ends are clamped.
+    """
     profile, tint = np.linspace(0.1, 1.0, 33), TINTS[colours]
     shares = np.array(tint) * (np.linspace(0.999, 1, 33)[:, None] if len(tint) > 1 else 1)
     values = profile[:, None] * shares.reshape(-1, len(tint))  # not proportional: three channels
@@ -195,7 +198,7 @@ def slabs(technique, transmittance):
 
 
 @pytest.mark.contract
-@pytest.mark.parametrize("technique, transmittance", PAIRS)
+@pytest.mark.parametrize(("technique", "transmittance"), PAIRS)
 def test_slabs_reflect_and_transmit_what_is_published(technique, transmittance):
     bound = largest_z(2 * len(SLABS))
     for result, (reflected, transmitted, _) in slabs(technique, transmittance):
@@ -224,7 +227,7 @@ def half_spaces(technique, transmittance):
 
 
 @pytest.mark.contract
-@pytest.mark.parametrize("technique, transmittance", PAIRS)
+@pytest.mark.parametrize(("technique", "transmittance"), PAIRS)
 def test_half_spaces_of_three_colours_reflect_what_chandrasekhar_says(technique, transmittance):
     for result, expected in half_spaces(technique, transmittance):
         mean, error = mean_and_error(result)
@@ -238,7 +241,7 @@ def test_eight_tenths_of_a_percent_would_show_in_the_half_spaces_of_all_techniqu
     assert_pooled([picture for pair in PAIRS for picture in half_spaces(*pair)], bias=0.008)
 
 
-@pytest.mark.parametrize("technique, transmittance", PAIRS)
+@pytest.mark.parametrize(("technique", "transmittance"), PAIRS)
 def test_a_white_slab_loses_nothing(technique, transmittance):
     assert_a_white_slab_loses_nothing(technique, transmittance)
 
@@ -276,7 +279,7 @@ def assert_centred(deviations, bias):
 
 
 @pytest.mark.contract
-@pytest.mark.parametrize("technique, transmittance", PAIRS)
+@pytest.mark.parametrize(("technique", "transmittance"), PAIRS)
 def test_low_discrepancy_samples_show_what_is_published(technique, transmittance):
     assert_centred(of_seeds(technique, transmittance), bias=0.03)
 

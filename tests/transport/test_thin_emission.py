@@ -85,9 +85,9 @@ def test_a_constant_emitter_that_nothing_attenuates_otherwise_has_no_noise():
 
 
 @pytest.mark.parametrize("colours", SCALES)
-def test_exact_flights_show_a_faint_part_of_a_medium_that_is_thick_elsewhere(colours, factor=1e-8):
+def test_exact_flights_show_a_faint_part_of_a_medium_that_is_thick_elsewhere(colours):
     """No bound of the whole medium says that these rays meet next to nothing."""
-    density = np.ones((9, 4, 8))
+    density, factor = np.ones((9, 4, 8)), 1e-8
     density[..., :4] = factor * PROFILE[:, None, None]
     medium = Medium(
         volume(density, *CUBE, "nearest"),

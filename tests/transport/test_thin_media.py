@@ -1,5 +1,8 @@
-"""Media much thinner than single precision tells apart from where the camera is: entry and exit are measured
-from close by, so that a slab of one optical depth looks alike down to a hundredth of a micrometre."""
+"""Media much thinner than single precision tells apart from where the camera is.
+
+Entry and exit are measured from close by, so that a slab of one optical depth looks alike down to a hundredth
+of a micrometre.
+"""
 
 from dataclasses import replace
 
@@ -28,8 +31,10 @@ def slab(thickness, kind, albedo=0.0, **more):
 
 
 def view(shapes, surfaces, fov=1e-4):
-    """Through a window so small that all rays are alike; a surface far off, if asked for, makes rays go from
-    surface to surface."""
+    """Through a window so small that all rays are alike.
+
+    A surface far off, if asked for, makes rays go from surface to surface.
+    """
     far = [surfaced(ball((0.0, 5.0, 0.0), SPECK), Diffuse((0.0,)))] if surfaces else []
     return picture([*shapes, *far], [SKY], EYE, (0, 0, 0), fov)
 

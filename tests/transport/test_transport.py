@@ -78,7 +78,7 @@ def test_furnace_without_light_sampling_is_one_to_the_last_bit(pair, eye):
     assert (result.variance == 0).all()
 
 
-@pytest.mark.parametrize("eye, absorption", FURNACES)
+@pytest.mark.parametrize(("eye", "absorption"), FURNACES)
 def test_furnace_of_homogeneous_media_is_one(eye, absorption):
     scene = furnace(homogeneous_pair, eye, UNLIT, max_depth=UNREACHED_DEPTH)
     result = render(scene, spp=24576, seed=2, transmittance="ratio", absorption=absorption)
@@ -86,7 +86,7 @@ def test_furnace_of_homogeneous_media_is_one(eye, absorption):
 
 
 @pytest.mark.contract
-@pytest.mark.parametrize("eye, absorption", FURNACES)
+@pytest.mark.parametrize(("eye", "absorption"), FURNACES)
 def test_furnace_of_grids_is_one(eye, absorption):
     scene = furnace(gridded_pair, eye, UNLIT[:1])
     result = render(scene, spp=24576, seed=3, transmittance="ratio", majorant="grid", absorption=absorption)
@@ -104,10 +104,12 @@ def test_a_furnace_of_albedo_a_little_below_one_is_noticed():
 
 
 @pytest.mark.contract
-@pytest.mark.parametrize("albedo, g, thickness, reflected, transmitted", SLABS)
+@pytest.mark.parametrize(("albedo", "g", "thickness", "reflected", "transmitted"), SLABS)
 def test_slabs_reflect_and_transmit_what_is_published(albedo, g, thickness, reflected, transmitted):
-    """Homogeneous (test_techniques.py has grids), within 3 standard errors of at most 0.0005: each of the 8
-    comparisons fails one seed in 370."""
+    """Homogeneous (test_techniques.py has grids), within 3 standard errors of at most 0.0005.
+
+    Each of the 8 comparisons fails one seed in 370.
+    """
     result = render(homogeneous_slab(albedo, g, thickness), spp=1 << 18, seed=4)
     (r, t, _), error = mean_and_error(result)
     assert error[:2].max() <= 0.0005

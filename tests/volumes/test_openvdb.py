@@ -1,5 +1,6 @@
-"""Side by side with OpenVDB: what its own module finds in its files and in ours, the reader finds, voxel by
-voxel.
+"""Side by side with OpenVDB.
+
+What its own module finds in its files and in ours, the reader finds, voxel by voxel.
 
 Runs when asked for: ``pytest --openvdb tests/volumes/test_openvdb.py``, which installs bpy (Blender as a
 module, with OpenVDB's in it) in an environment of its own, unless CLVOL_OPENVDB names a Python that has it.
@@ -12,7 +13,7 @@ import os
 import subprocess
 import sys
 from itertools import product
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import openvdb_worker
@@ -23,6 +24,9 @@ from volume_samples import probe
 
 from clvol.scene.describe import describe_volume
 from clvol.volumes import list_vdb, read_vdb
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 REQUIREMENT = "bpy==5.0.*"
 RENDERED = ("float", "double", "int32", "int64")
