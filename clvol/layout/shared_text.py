@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import cache
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from clvol.layout import constants
 from clvol.layout.bsdfs import BSDF_FACTS
 from clvol.layout.records import ENUMS, RECORDS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    import numpy as np
 
 C_TYPES = {"f": "float", "i": "int", "u": "uint"}
 
@@ -33,7 +35,7 @@ _NUMBERS = (
 def record_text(name: str, dtype: np.dtype[Any]) -> str:
     """C struct of a record dtype."""
     lines = []
-    for field in dtype.names:
+    for field in dtype.names or ():
         base, shape = dtype[field].base, dtype[field].shape
         suffix = f"[{shape[0]}]" if shape else ""
         lines.append(f"    {C_TYPES[base.kind]} {field}{suffix};")

@@ -1,5 +1,7 @@
-"""The stages of a wave and the contract of each: which queue it empties, where it may hand a path on to and
-why, and which values of the path it reads and writes.
+"""The stages of a wave and the contract of each.
+
+A contract says which queue a stage empties, where it may hand a path on to and why, and which values of the
+path it reads and writes.
 
 What moves paths is made from this table (`clvol.layout.stage_text`): the loop over a queue that each stage's
 kernel is, the functions that hand a path on, `to_shade(scene, group, slot, EVENT_WALK)`, and those that read
