@@ -18,7 +18,7 @@ import bench
 import click
 from bench_options import mitsuba_option
 from bench_tables import judge
-from docs_tables import ROOT, performance_part, pilot_page, techniques_page
+from docs_tables import ROOT, performance_part, pilot_page, techniques_page, transitions_part
 from documents import between, writable, write
 from pilot import SCENES, pilot_options, tested
 
@@ -28,10 +28,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 DOCS = ROOT / "docs"
-PERFORMANCE = DOCS / "performance.md"
+PERFORMANCE, ARCHITECTURE = DOCS / "performance.md", DOCS / "architecture.md"
 PICTURED = ("gallery.md", "ray.md")
 """Pages whose commands make their pictures."""
 FIRST, LAST = "<!-- performance: written by tools/docs.py -->", "<!-- end of performance -->"
+TRANSITIONS = "<!-- transitions: written by tools/docs.py -->", "<!-- end of transitions -->"
 
 
 def commands() -> dict[str, list[str]]:
@@ -143,6 +144,14 @@ def performance(context: click.Context, mitsuba: str | None, rough: bool, output
     before, after = enclosed(output)  # as it is by now
     write(output, f"{before}\n{performance_part(figures)}\n{after}")
     return max(judge(bench.rows(figures)), bench.say_left_out(figures))
+
+
+@main.command()
+@output_option(ARCHITECTURE)
+def transitions(output: Path) -> None:
+    """The table of architecture.md, between its markers, from the contracts of the stages."""
+    before, after = between(output.read_text(encoding="utf-8"), *TRANSITIONS, output.name)
+    write(output, f"{before}\n{transitions_part()}\n{after}")
 
 
 @main.command("all")

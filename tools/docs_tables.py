@@ -17,6 +17,7 @@ from pilot import HEADER, HOPELESS, Tested
 
 import clvol
 from clvol.device.device import open_device
+from clvol.layout.stages import IDLE, QUEUES, STAGES
 from clvol.planning.registry import TECHNIQUES, TRANSMITTANCES
 
 if TYPE_CHECKING:
@@ -190,6 +191,18 @@ def pilot_page(command: str, outcomes: Iterable[Tested], **about: object) -> tup
         within &= outcome.within
     text = PILOT.format(command=command, machine=machine(), hopeless=HOPELESS, **about)
     return text + "\n".join(lines) + "\n", within
+
+
+def transitions_part() -> str:
+    """The contracts of the stages as a table: where each hands a path on to, and why."""
+    lines = ["| stage | empties | hands a path on to | when |", "|---|---|---|---|"]
+    for stage in STAGES:
+        for n, transition in enumerate(stage.transitions):
+            first = f"**{stage.name}** | {stage.empties}" if n == 0 else " | "
+            lines.append(f"| {first} | {transition.to} | {transition.when} |")
+    lines += ["", *(f"- **{name}**: {queue.holds}." for name, queue in QUEUES.items())]
+    lines.append(f"- **{IDLE}**: slots that hold no path, in no queue.")
+    return "\n".join(["", *lines, ""])
 
 
 def performance_part(figures: Measured) -> str:

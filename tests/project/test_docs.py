@@ -7,6 +7,7 @@ is there.
 from __future__ import annotations
 
 import re
+import tomllib
 from functools import cache
 from pathlib import Path
 
@@ -82,6 +83,14 @@ def test_every_list_is_one_to_markdown_too(page: Path) -> None:
     text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
     joined = re.findall(r"^(?! |-|\d+\.|#|\|).+\n(?:-|1\.) .*", text, re.MULTILINE)
     assert not joined, "a list begins after an empty line"
+
+
+def test_the_rooms_stand_in_the_order_that_is_checked() -> None:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"]
+    [layers] = [contract["layers"] for contract in settings["contracts"] if contract["id"] == "rooms"]
+    rooms = [name for layer in reversed(layers) for name in layer.split(" | ")]
+    table = re.findall(r"^\| `clvol/(\w+)(?:/|\.py)` \|", text_of("architecture.md"), re.MULTILINE)
+    assert table == [room for room in rooms if room not in ("errors", "version")]
 
 
 def test_every_page_is_in_the_navigation() -> None:

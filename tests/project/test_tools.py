@@ -270,6 +270,13 @@ def test_performance_replaces_what_is_between_the_markers(
     assert list(tmp_path.iterdir()) == [page]
 
 
+def test_the_table_of_transitions_is_what_the_contracts_of_the_stages_say(tool) -> None:
+    docs = tool("docs")
+    text = docs.ARCHITECTURE.read_text(encoding="utf-8")
+    written = text.split(docs.TRANSITIONS[0])[1].split(docs.TRANSITIONS[1])[0]
+    assert written.strip() == docs.transitions_part().strip(), "run: python tools/docs.py transitions"
+
+
 @pytest.mark.parametrize("text", ["no markers", "{last} {first}", "{first} {last} {first} {last}"])
 def test_a_file_without_its_markers_is_refused_before_measuring(
     tool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str
