@@ -19,7 +19,7 @@ from clvol.version import __version__
 if TYPE_CHECKING:
     from types import FrameType
 
-    from clvol.api import render
+    from clvol.api import plan, render
     from clvol.errors import DeviceError, Error, OptionError, RenderError, SceneError, VolumeError
     from clvol.lab.comparison import Comparison, compare
     from clvol.lab.ray.trace import trace_ray
@@ -48,6 +48,7 @@ __all__ = [
     "load_file",
     "look_at",
     "merge",
+    "plan",
     "render",
     "rotate",
     "scale",
@@ -57,7 +58,7 @@ __all__ = [
 ]
 
 _MODULES = {
-    "clvol.api": ["render"],
+    "clvol.api": ["plan", "render"],
     "clvol.errors": ["DeviceError", "Error", "OptionError", "RenderError", "SceneError", "VolumeError"],
     "clvol.lab.comparison": ["Comparison", "compare"],
     "clvol.lab.ray.trace": ["trace_ray"],

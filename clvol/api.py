@@ -1,4 +1,4 @@
-"""`clvol.render`: from a scene and the user's choices to a Result."""
+"""`clvol.render`: from a scene and the user's choices to a Result; `clvol.plan`: to what it would do."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import operator
 import time
 from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from clvol.base.arguments import check_seed, positive
@@ -19,6 +18,7 @@ from clvol.errors import OptionError, shown
 from clvol.picture.result import Result
 from clvol.planning import registry
 from clvol.planning.choices import Choices
+from clvol.planning.plan import Plan
 from clvol.rendering.adaptive import TargetRender
 from clvol.rendering.outcome import make_result
 from clvol.rendering.session import MAX_SAMPLES, Session
@@ -103,39 +103,35 @@ def render(
     RenderError
         The render was to end, and no pass of samples ever did.
     """
-    if not isinstance(scene, Scene):
-        raise OptionError(
-            f"render takes a Scene, not {type(scene).__name__}", hint="make one with load_file or load_dict"
-        )
-    asked = {
-        "technique": technique,
-        "transmittance": transmittance,
-        "majorant": majorant,
-        "lookup": lookup,
-        "absorption": absorption,
-        "probability": probability,
-        "control": control,
-        "sampler": sampler,
-    }
-    piloted = isinstance(technique, str) and technique == registry.PILOT
+    given = dict(locals())
+    asked = {family: given[family] for family in registry.FAMILIES}
+    _check_scene("render", scene)
+    for family, name in asked.items():
+        registry.check_choice(family, name, pilot=True)
+    piloted = asked["technique"] == registry.PILOT
     if piloted:
         asked["technique"] = "auto"
-    names = {family: _choice(scene, family, value) for family, value in asked.items()}
+    choices = Choices.for_scene(
+        scene, asked, majorant_scale=majorant_scale, step=step, target_error=target_error, aov=aov
+    )
     if piloted:
-        names["technique"] = "auto"  # the scene's own technique too is put to the test
-    choices = Choices(**names, majorant_scale=majorant_scale, step=step, target_error=target_error, aov=aov)
+        choices = choices.but(technique="auto")  # the scene's own technique too is put to the test
     if target_error is not None and samples is not None:
         raise OptionError("target_error and samples exclude each other", hint="spp says how many at most")
     first, count = _sample_range(scene, spp, time_limit, samples)
     seed = check_seed(scene.seed if seed is None else seed)
     bar = RichProgress() if progress is True else nullcontext(progress or None)
+    started = time.perf_counter()
+    planned = Plan.of(scene, choices)
+    spent = time.perf_counter() - started
     opened = open_device(device)
     if piloted:
         with bar as callback:
-            choices, found, given = _piloted(opened, scene, choices, seed, count, time_limit, callback)
-    session = Session.for_scene(opened, scene, choices, seed, pool)
+            choices, found, options = _piloted(opened, scene, choices, seed, count, time_limit, callback)
+        planned = planned.having(choices)
+    session = Session.for_plan(opened, scene, planned, seed, pool, spent)
     session.describe()
-    session.warn_of_unused(asked)
+    session.warn(asked)
     with interruptible() as interrupt:
         with bar as callback:
             interrupt.heed(patience=2)
@@ -150,11 +146,44 @@ def render(
         result.metadata["target_error"] = target_error
     if piloted:
         if target_error is not None:
-            extent = {"spp": spp, "time": time_limit}
+            extent: dict[str, Any] = {"spp": spp, "time": time_limit}
         else:  # a time limit is repeated by the samples it was enough for
             extent = {"samples": f"{first},{done}"} if first else {"spp": done}
-        _say_how_to_repeat(result, scene, found, given | extent | {"seed": seed, "device": device})
+        _say_how_to_repeat(result, scene, found, options | extent | {"seed": seed, "device": device})
     return result
+
+
+def plan(scene: Scene, **choices: Any) -> Plan:
+    """Say what `render` would do for a scene, without a device and before anything is built.
+
+    Parameters
+    ----------
+    scene : from `load_file` or `load_dict`.
+    choices : technique, transmittance, majorant, lookup, absorption, probability, control, sampler,
+        majorant_scale, step, target_error, aov, as for `render`.
+
+    Returns
+    -------
+    Plan.  Printed it says the choices with their reasons, what the scene was found to use, and what is
+    compiled.  A majorant left at auto is weighed when the volumes are prepared.
+
+    Raises
+    ------
+    OptionError : a choice that won't do.
+    """
+    _check_scene("plan", scene)
+    names = {family: choices.pop(family, "auto") for family in registry.FAMILIES}
+    for family, name in names.items():
+        registry.check_choice(family, name)
+    return Plan.of(scene, Choices.for_scene(scene, names, **choices))
+
+
+def _check_scene(function: str, scene: object) -> None:
+    if not isinstance(scene, Scene):
+        raise OptionError(
+            f"{function} takes a Scene, not {type(scene).__name__}",
+            hint="make one with load_file or load_dict",
+        )
 
 
 def _say_how_to_repeat(result: Result, scene: Scene, found: Found, options: dict[str, Any]) -> None:
@@ -184,22 +213,15 @@ def _piloted(
         if callback is not None:
             callback(Progress(done, total, time.perf_counter() - started, what="pilot"))
 
-    even = replace(choices, target_error=None)  # its trials give every pixel as many samples
+    even = choices.but(target_error=None)  # its trials give every pixel as many samples
     found = pilot(device, scene, even, seed=seed, spp=count, time_limit=time_limit, tell=tell)
     log.info("pilot: %s; %s", ", ".join(f"{k} {v}" for k, v in found.names.items()), found.reason)
-    given = {f: n for f, n in choices.names.items() if n != "auto" and f not in found.names}
+    given: dict[str, Any] = {f: n for f, n in choices.names.items() if n != "auto" and f not in found.names}
     if choices.majorant_scale != 1:
         given["majorant_scale"] = choices.majorant_scale
     for name in ("step", "target_error", "aov"):
         given[name] = getattr(choices, name)
-    return replace(choices, **found.names), found, given
-
-
-def _choice(scene: Scene, family: str, value: str) -> str:
-    """The caller's choice, else the scene's, else auto."""
-    if isinstance(value, str) and value == "auto":
-        return registry.check_choice(family, scene.integrator.choices.get(family, "auto"))
-    return registry.check_choice(family, value, pilot=True)
+    return choices.but(**found.names), found, given
 
 
 def _sample_range(

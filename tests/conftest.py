@@ -47,10 +47,10 @@ def pytest_collection_modifyitems(config, items):
 def independent_samples():
     """Tests judge single pixels by their variance, which has many degrees of freedom where samples are
     independent: that is the default here.  Low-discrepancy samples are asked for by name (test_sobol.py)."""
-    from clvol.planning import choices
+    from clvol.planning import auto
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(choices, "DEFAULT_SAMPLER", "independent")
+        patch.setattr(auto, "DEFAULT_SAMPLER", "independent")
         yield
 
 

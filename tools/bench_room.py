@@ -16,7 +16,7 @@ def stage_seconds(scene: str, res: int, choices: dict[str, str], device: str | N
     opened = open_scene(scene, {"res": res}, choices, device)
     opened.render(1, 0)
     seconds = opened.render(16, 1).result.stats["seconds"]
-    return {stage: seconds[stage] for stage in opened.config().stages}
+    return {stage: seconds[stage] for stage in opened.plan.stages}
 
 
 def measure_room(

@@ -14,16 +14,16 @@ from clvol.cli.messages import fail
 from clvol.cli.options import ExplainedCommand, definitions_option
 from clvol.device.programs import stage_source
 from clvol.errors import DeviceError, Error
-from clvol.planning.config import KernelConfig
+from clvol.planning.plan import Plan
 
 
-def dump(config: KernelConfig, folder: Path) -> list[Path]:
-    """Write FOLDER/STAGE.cl for every stage of `config`, and accumulate.cl; return the paths."""
+def dump(plan: Plan, folder: Path) -> list[Path]:
+    """Write FOLDER/STAGE.cl for every stage of `plan`, and accumulate.cl; return the paths."""
     folder.mkdir(parents=True, exist_ok=True)
     written = []
-    for stage in (*config.stages, "accumulate"):
+    for stage in (*plan.stages, "accumulate"):
         path = folder / f"{stage}.cl"
-        path.write_text(stage_source(config, stage), encoding="utf-8")
+        path.write_text(stage_source(plan, stage), encoding="utf-8")
         written.append(path)
     return written
 
@@ -46,7 +46,7 @@ def main(
 ) -> None:
     """Write the composed source of each kernel that SCENE needs."""
     opened = open_scene(scene, dict(definitions), choices, device)
-    for path in dump(opened.config(), output):
+    for path in dump(opened.plan, output):
         lines = len(path.read_text(encoding="utf-8").splitlines())
         click.echo(f"{path}: {lines} lines, {path.stat().st_size} bytes")
 

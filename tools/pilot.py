@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import click
 import numpy as np
@@ -91,7 +91,7 @@ def unmet(pilot: Pilot, count: int) -> list[Candidate]:
     """
     product = list(itertools.product(*(unbiased(family) for family in CHOSEN)))
     drawn = (product[place] for place in np.random.default_rng(0).permutation(len(product)))
-    asked = (replace(pilot.choices, **dict(zip(CHOSEN, names, strict=True))) for names in drawn)
+    asked = (pilot.choices.but(**dict(zip(CHOSEN, names, strict=True))) for names in drawn)
     added = list(itertools.islice(pilot.admitted(asked, list(pilot.candidates)), count))
     auto = pilot.candidates[0]
     limit = SLOW * float(np.median(auto.seconds))
@@ -134,7 +134,7 @@ def compared(again: list[Candidate], chosen: Candidate) -> tuple[Candidate, Rela
 
 def is_of(candidate: Candidate, names: dict[str, str]) -> bool:
     """Whether a candidate is the one with these choices."""
-    return all(getattr(candidate.trial.session.config, family) == name for family, name in names.items())
+    return all(candidate.trial.session.plan.chosen[family] == name for family, name in names.items())
 
 
 def half(candidate: Candidate, which: int) -> Candidate:

@@ -10,14 +10,13 @@ from typing import NamedTuple
 from clvol.cli.options import device_option, family_options
 from clvol.device.device import Device, open_device
 from clvol.picture.result import Result
-from clvol.planning.choices import Choices, prepare_for
-from clvol.planning.config import KernelConfig
-from clvol.planning.registry import FAMILIES
+from clvol.planning.choices import Choices
+from clvol.planning.plan import Plan
 from clvol.rendering.outcome import make_result
-from clvol.rendering.session import Session, kernel_config
+from clvol.rendering.session import Session, on_device
 from clvol.scene import load_file
 from clvol.scene.records import Scene
-from clvol.tables.prepare import PreparedScene
+from clvol.tables.prepare import PreparedScene, prepare
 
 
 class Timed(NamedTuple):
@@ -30,20 +29,20 @@ class Timed(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class OpenScene:
-    """A scene on the host, the choices for it, and the device it will be rendered on."""
+    """A scene on the host, and the device it will be rendered on."""
 
     device: Device
     prepared: PreparedScene
-    choices: Choices
 
     @classmethod
     def of(cls, device: Device, scene: Scene, choices: Choices) -> OpenScene:
         """Prepare a scene for the choices."""
-        return cls(device, prepare_for(scene, choices), choices)
+        return cls(device, prepare(scene, Plan.of(scene, choices)))
 
-    def config(self) -> KernelConfig:
+    @property
+    def plan(self) -> Plan:
         """What is compiled for it."""
-        return kernel_config(self.prepared, self.choices, self.device)
+        return on_device(self.prepared, self.device).plan
 
     def render(self, spp: int, seed: int, pool: int | None = None) -> Timed:
         """Render the first `spp` samples; the kernels are built, and loaded, before the clocks start."""
@@ -54,7 +53,7 @@ class OpenScene:
 
     def session(self, seed: int, pool: int | None = None) -> Session:
         """Kernels built, scene uploaded, an empty film."""
-        return Session.open(self.device, self.prepared, self.choices, seed, pool)
+        return Session.open(self.device, self.prepared, seed, pool)
 
 
 def open_scene(
@@ -62,12 +61,7 @@ def open_scene(
 ) -> OpenScene:
     """Load and prepare a scene; a choice of "auto" becomes the scene's own where it has one."""
     scene = load_file(path, **defaults)
-    settled = {}
-    for family in FAMILIES:
-        value = choices.get(family, "auto")
-        settled[family] = scene.integrator.choices.get(family, "auto") if value == "auto" else value
-    chosen = Choices(**settled)
-    return OpenScene.of(open_device(pattern), scene, chosen)
+    return OpenScene.of(open_device(pattern), scene, Choices.for_scene(scene, choices))
 
 
 def choice_options(command: Callable) -> Callable:

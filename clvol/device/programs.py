@@ -1,4 +1,4 @@
-"""From a KernelConfig to bound kernels: composes one translation unit per stage and builds it.
+"""From a plan to bound kernels: composes one translation unit per stage and builds it.
 
 Files under cl/ include what they use and guard what they hold; choices fill slots.  Units are written out in
 full (clvol.device.preprocess), so that a dump is self-contained, no include path reaches the compiler, and
@@ -18,14 +18,13 @@ import pyopencl as cl
 from clvol import layout
 from clvol.device.preprocess import Preprocessor
 from clvol.errors import DeviceError
-from clvol.planning import registry
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from clvol.device.device import Device
     from clvol.layout.stages import Stage
-    from clvol.planning.config import KernelConfig
+    from clvol.planning.plan import Plan
 
 LAYOUT, CONTRACT = "layout", "contract"
 SHARED = {
@@ -46,21 +45,6 @@ def kernel_source(name: str) -> str:
     installed = package.joinpath("_cl")
     folder = installed if installed.is_dir() else package.joinpath("..", "cl")
     return folder.joinpath(name).read_text(encoding="utf-8")
-
-
-def slots(config: KernelConfig) -> dict[str, str]:
-    """The files that choices fill in: what `#include CLVOL_..._HEADER` stands for under cl/."""
-    chosen = {
-        "SAMPLER": registry.SAMPLERS[config.sampler],
-        "TECHNIQUE": config.tracker,
-        "TRANSMITTANCE": registry.TRANSMITTANCES[config.transmittance],
-        "LOOKUP": registry.LOOKUPS[config.lookup],
-    }
-    files = {name: choice.header for name, choice in chosen.items() if choice.header}
-    if config.majorant != "none":
-        grid = config.tree_grid
-        files["MAJORANT"] = "majorant/tree_grid.h" if grid else registry.MAJORANTS[config.majorant].header
-    return {f"CLVOL_{name}_HEADER": file for name, file in files.items()}
 
 
 def expand(
@@ -88,23 +72,24 @@ def expand(
 
 
 def compose(
-    config: KernelConfig,
+    plan: Plan,
     text: str,
     macros: Mapping[str, int] = MappingProxyType({}),
     stage: Stage | None = None,
 ) -> str:
-    """The translation unit of `text` for a configuration, and more macros; `stage`: whose contract holds."""
-    records = layout.layout_text(config.macros, stage)
-    contract = layout.stage_text(config.macros, stage) if stage else ""
-    return expand(text, {**config.macros, **macros}, slots(config), records, contract)
+    """The translation unit of `text` for a plan, and more macros; `stage`: whose contract holds."""
+    records = layout.layout_text(plan.macros, stage)
+    contract = layout.stage_text(plan.macros, stage) if stage else ""
+    slots = {f"CLVOL_{family.upper()}_HEADER": header for family, header in plan.slots.items()}
+    return expand(text, {**plan.macros, **macros}, slots, records, contract)
 
 
-def stage_source(config: KernelConfig, stage: str) -> str:
+def stage_source(plan: Plan, stage: str) -> str:
     """The composed source of one stage kernel, or of `accumulate`."""
     if stage == "accumulate":
-        return compose(config, '#include "kernels/accumulate.cl"\n')
+        return compose(plan, '#include "kernels/accumulate.cl"\n')
     text = f'#include "stages/{stage}.h"\n#include "kernels/stage.cl"\n'
-    return compose(config, text, stage=layout.stage(stage))
+    return compose(plan, text, stage=layout.stage(stage))
 
 
 def build(device: Device, source: str, name: str) -> cl.Program:
@@ -119,13 +104,14 @@ def build(device: Device, source: str, name: str) -> cl.Program:
         device.programs[source] = program.build(options=list(BUILD_OPTIONS))
         return device.programs[source]
     except cl.RuntimeError as error:
-        log = program.get_build_info(device.queue.device, cl.program_build_info.LOG).strip() or str(error)
+        info = cl.program_build_info.LOG
+        log = program.get_build_info(device.queue.device, info).strip() or str(error)  # type: ignore[no-untyped-call]
         raise DeviceError(f"kernel {name!r} does not build on {device.description}:\n{log}") from error
 
 
-def build_stages(device: Device, config: KernelConfig) -> dict[str, cl.Kernel]:
-    """One kernel object per stage of `config`, and `accumulate`."""
-    names = (*config.stages, "accumulate")
+def build_stages(device: Device, plan: Plan) -> dict[str, cl.Kernel]:
+    """One kernel object per stage of `plan`, and `accumulate`."""
+    names = (*plan.stages, "accumulate")
     return {
-        name: cl.Kernel(build(device, stage_source(config, name), name), f"{name}_kernel") for name in names
+        name: cl.Kernel(build(device, stage_source(plan, name), name), f"{name}_kernel") for name in names
     }

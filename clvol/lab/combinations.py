@@ -14,11 +14,9 @@ import numpy as np
 
 from clvol.errors import OptionError
 from clvol.lab.trials import Trial
-from clvol.planning.choices import Choices, refuse_impossible, resolve
-from clvol.planning.config import KernelConfig
-from clvol.planning.features import Features
+from clvol.planning.choices import Choices
+from clvol.planning.plan import Plan
 from clvol.planning.registry import FAMILIES
-from clvol.rendering.session import Session
 
 MOST_CONSIDERED = 4096
 """Of a larger product of choices so many combinations are drawn, always the same."""
@@ -41,32 +39,31 @@ heterogeneous media does for any transmittance but `none`."""
 KEYS = (*FAMILIES, LIGHTS)
 
 
-def names_in_force(session: Session) -> Names:
+def names_in_force(plan: Plan) -> Names:
     """The choices in force, by family, and `LIGHTS`; "none" or "analytic" where a scene has no use for it."""
-    return session.choices() | {LIGHTS: "sampled" if session.config.nee else "found"}
+    return {**plan.in_force, LIGHTS: "sampled" if plan.nee else "found"}
 
 
 def options_of(trial: Trial) -> str:
     """What `clvol render` repeats a trial with."""
-    config = trial.session.config
-    if config.nee and "--transmittance" not in trial.options:
-        return f"{trial.options} --transmittance {config.transmittance}".strip()
+    plan = trial.session.plan
+    if plan.nee and "--transmittance" not in trial.options:
+        return f"{trial.options} --transmittance {plan.chosen['transmittance']}".strip()
     return trial.options
 
 
-def in_force(features: Features, names: Mapping[str, str]) -> Names | None:
-    """What explicit `names` of every family come to in a scene; None for what cannot be right."""
-    choices = Choices(**names)
+def in_force(scene: Plan, names: Mapping[str, str]) -> Names | None:
+    """What explicit `names` of every family come to in a scene; None for what cannot be right.
+
+    `scene`: any plan of it.
+    """
     try:
-        resolved = resolve(features, choices.names)
-        refuse_impossible(features, choices, resolved)
+        return names_in_force(scene.having(Choices(**names)))
     except OptionError:
         return None
-    resolved["majorant"] = names["majorant"] if features.heterogeneous else "none"
-    return names_in_force(Session(None, None, KernelConfig(features, **resolved), None, 0))
 
 
-def usable(features: Features) -> dict[tuple[str, ...], Names]:
+def usable(scene: Plan) -> dict[tuple[str, ...], Names]:
     """Combinations to ask for, by what they come to (in the order of `KEYS`)."""
     tables = [unbiased(family) for family in FAMILIES]
     shape = [len(table) for table in tables]
@@ -78,7 +75,7 @@ def usable(features: Features) -> dict[tuple[str, ...], Names]:
     for number in wanted:
         places = np.unravel_index(number, shape)
         names = {f: table[n] for f, table, n in zip(FAMILIES, tables, places, strict=True)}
-        used = in_force(features, names)
+        used = in_force(scene, names)
         if used is not None:
             found.setdefault(tuple(used[key] for key in KEYS), names)
     return found
@@ -96,15 +93,16 @@ class Covering:
     all_pairs: int
 
 
-def covering(features: Features, first: Mapping[str, str], most: int | None = None) -> Covering:
+def covering(scene: Plan, first: Mapping[str, str], most: int | None = None) -> Covering:
     """A small set of combinations in which every choice occurs, and pairs of choices as far as `most` allows.
 
     Parameters
     ----------
+    scene : any plan of it.
     first : names in force of a combination that is had already, and is not in the set.
     most : combinations beyond which no further pairs are sought; None: single choices are enough.
     """
-    found = usable(features)
+    found = usable(scene)
     rows = np.array([key for key in found], dtype=object).reshape(len(found), len(KEYS))
     levels = [{name: n for n, name in enumerate(dict.fromkeys(column))} for column in rows.T]
     codes = np.array([[level[v] for level, v in zip(levels, row, strict=True)] for row in rows], int)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from clvol.device.device import Device
 from clvol.device.programs import stage_source
@@ -30,13 +30,13 @@ from clvol.lab.quiet import quiet_renders
 from clvol.lab.reduced import reduced
 from clvol.lab.seeds import independent_seeds
 from clvol.lab.trials import Trial
-from clvol.planning.choices import Choices, majorant_needs, prepare_for, refuse_impossible, resolve
-from clvol.planning.config import KernelConfig
-from clvol.planning.features import Features
+from clvol.planning.choices import Choices
+from clvol.planning.needs import MajorantNeeds
+from clvol.planning.plan import Plan
 from clvol.planning.registry import FAMILIES
 from clvol.rendering.session import MAX_SAMPLES, Session
 from clvol.scene.records import Scene
-from clvol.tables.prepare import MajorantNeeds, PreparedScene
+from clvol.tables.prepare import PreparedScene, prepare
 
 log = logging.getLogger("clvol.pilot")
 CHOSEN = ("technique", "transmittance", "majorant")
@@ -118,16 +118,17 @@ class Pilot:
     ) -> None:
         self.keep = keep  # candidates that are out stay open, to be measured again
         self.device, self.scene, self.seeds = device, scene, seeds
-        self.choices = replace(choices, target_error=None)  # rounds have as many samples in every pixel
+        self.choices = choices.but(target_error=None)  # rounds have as many samples in every pixel
+        self.small = reduced(scene, _MOST_PIXELS)
+        self.plan = Plan.of(self.small, self.choices)
         self.time_limit = time_limit
         self.samples = None if spp >= MAX_SAMPLES else spp
         self.tell = tell or (lambda done, total: None)
-        self.features = Features.from_scene(scene)
         self.prepared: dict[MajorantNeeds, tuple[PreparedScene, float]] = {}
         self.kernel_seconds = self.seconds = 0.0
         self.whole: float | None = None  # rounds of the pilot that the picture is worth
         self.candidates: list[Candidate] = []
-        self.open = [f for f in CHOSEN if getattr(choices, f) == "auto"]
+        self.open = [f for f in CHOSEN if choices[f] == "auto"]
         self.done = 0
         self.planned = sum(ROUNDS * 2 * len(unbiased(family)) for family in self.open) + 2 * FINAL_ROUNDS
         self.considered = {f: 0 for f in self.open}
@@ -136,7 +137,7 @@ class Pilot:
         """Run the stages."""
         self.tell(0, self.planned)
         film = self.scene.film.window
-        self.small, self.spp = reduced(self.scene, _MOST_PIXELS), _SPP
+        self.spp = _SPP
         auto = best = self._open(self.choices)
         self._plan(auto, film[2] * film[3])
         for family in self.open:
@@ -157,17 +158,17 @@ class Pilot:
 
     def _open(self, choices: Choices) -> Candidate:
         """A candidate; scenes prepared for the same needs are prepared once."""
-        needs = majorant_needs(choices, resolve(self.features, choices.names))
-        if needs not in self.prepared:
+        plan = self.plan.having(choices)
+        if plan.needs not in self.prepared:
             started = clock(self.device)
-            self.prepared[needs] = prepare_for(self.small, choices), clock(self.device) - started
-        prepared, seconds = self.prepared[needs]
+            self.prepared[plan.needs] = prepare(self.small, plan), clock(self.device) - started
+        prepared, seconds = self.prepared[plan.needs]
         started = clock(self.device)
-        session = Session.open(self.device, prepared, choices, 0)
+        session = Session.open(self.device, prepared.under(plan), 0)
         spent = clock(self.device) - started
         self.kernel_seconds += session.kernel_seconds
         seconds += spent * (1 - session.kernel_seconds / session.setup_seconds)
-        names = session.choices()
+        names = dict(session.plan.in_force)
         label = " + ".join(names[family] for family in CHOSEN)
         self.candidates.append(Candidate(label, Trial(session, choices, names, seconds)))
         return self.candidates[-1]
@@ -181,7 +182,7 @@ class Pilot:
         expected = self.time_limit or each * pixels * self.samples
         self.budget = min(max(SHARE * expected, LEAST_SECONDS), MOST_SECONDS)
         samples = self.budget / (max(self.planned, 1) * each * _TYPICAL)
-        least = _LEAST_PATHS / auto.trial.session.config.jobs_per_sample
+        least = _LEAST_PATHS / auto.trial.session.plan.jobs_per_sample
         self.spp = 2 ** max(1, round(math.log2(max(samples, least) / count)))
         self.whole = None if self.samples is None else self.samples * pixels / (self.spp * count)
 
@@ -207,20 +208,19 @@ class Pilot:
 
     def _others(self, family: str, best: Candidate) -> list[Candidate]:
         """Candidates with the family's other choices."""
-        config = best.trial.session.config
-        if getattr(config, family) not in FAMILIES[family]:
+        if best.trial.session.plan.chosen[family] not in FAMILIES[family]:
             return []  # no majorant is walked
-        asked = (replace(best.trial.choices, **{family: name}) for name in unbiased(family))
+        asked = (best.trial.choices.but(**{family: name}) for name in unbiased(family))
         return list(self.admitted(asked, [best]))
 
     def admitted(self, asked: Iterable[Choices], among: list[Candidate]) -> Iterator[Candidate]:
         """Candidates of the choices asked for, but for those that cannot be right, and those that compose the
         same kernels as one of `among` or of each other; like `among[0]` in all that they leave at auto."""
-        config = among[0].trial.session.config
-        seen = {self._sources(c.trial.session.config) for c in among}
+        plan = among[0].trial.session.plan
+        seen = {self._sources(c.trial.session.plan) for c in among}
         for choices in asked:
-            names = {family: choices.names[family] for family in CHOSEN}
-            sources = self._sources(replace(config, **{f: n for f, n in names.items() if n != "auto"}))
+            names = {family: choices[family] for family in CHOSEN}
+            sources = self._sources(plan.renamed(**{f: n for f, n in names.items() if n != "auto"}))
             if sources not in seen and self._possible(choices) and self._fits(among[0]):
                 seen.add(sources)
                 yield self._open(choices)
@@ -242,14 +242,14 @@ class Pilot:
 
     def _possible(self, choices: Choices) -> bool:
         try:
-            refuse_impossible(self.features, choices, resolve(self.features, choices.names))
+            self.plan.having(choices)
         except OptionError:
             return False
         return True
 
     @staticmethod
-    def _sources(config: KernelConfig) -> tuple[str, ...]:
-        return tuple(stage_source(config, stage) for stage in config.stages)
+    def _sources(plan: Plan) -> tuple[str, ...]:
+        return tuple(stage_source(plan, stage) for stage in plan.stages)
 
     def render(self, candidate: Candidate) -> None:
         """Another round of a candidate, counted and told."""
@@ -270,8 +270,8 @@ class Pilot:
         other = f", with {best.label} {relative} times as efficient" if 0 < relative.value != 1 else ""
         if stays:
             best, relative = auto, Relative(1.0, 1.0, 1.0)
-        config, names = best.trial.session.config, best.trial.session.choices()
-        chosen = {f: getattr(config, f) for f in CHOSEN if getattr(config, f) in FAMILIES[f]}
+        plan, names = best.trial.session.plan, best.trial.session.plan.in_force
+        chosen = {f: plan.chosen[f] for f in CHOSEN if plan.chosen[f] in FAMILIES[f]}
         tried = [f"{count} {family}s" for family, count in self.considered.items() if count > 1]
         numbers = " and ".join([", ".join(tried[:-1]), tried[-1]] if tried[1:] else tried)
         if not numbers:
@@ -282,6 +282,6 @@ class Pilot:
             reason = f"{relative} times as efficient as auto's {auto.label}, of {numbers} tried"
         if numbers:
             reason += f"; {self.seconds:.1f} s of rendering, {self.kernel_seconds:.1f} s of kernel builds"
-        used = {f: n for f, n in chosen.items() if names[f] == n or (f == "transmittance" and config.nee)}
+        used = {f: n for f, n in chosen.items() if names[f] == n or (f == "transmittance" and plan.nee)}
         options = " ".join(f"--{family} {name}" for family, name in used.items())
         return Found(chosen, options, reason, relative, self.seconds, self.kernel_seconds)

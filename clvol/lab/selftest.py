@@ -35,7 +35,6 @@ from clvol.lab.seeds import independent_seeds
 from clvol.lab.trials import Trial, rounds
 from clvol.picture.result import Result
 from clvol.planning.choices import Choices
-from clvol.planning.features import Features
 from clvol.rendering.session import MAX_SAMPLES
 from clvol.scene.records import Scene
 
@@ -268,9 +267,10 @@ def open_covering(
     trials: list[Trial], device: Device, scene: Scene, effort: Effort, tell: Step
 ) -> tuple[int, int]:
     """Add to what `auto` comes to the combinations that cover every choice; the pairs had, and possible."""
-    found = covering(Features.from_scene(scene), names_in_force(trials[0].session), effort.combinations)
+    first = trials[0].session
+    found = covering(first.plan, names_in_force(first.plan), effort.combinations)
     total = 1 + len(found.combinations)
-    need = total * trials[0].session.wavefront.bytes
+    need = total * first.wavefront.bytes
     if need > device.info.global_memory / 2:
         raise OptionError(
             f"a self-test of this scene keeps {need / 2**30:.1f} GiB on the device, over half of what it has",
@@ -293,7 +293,9 @@ def affordable(trials: list[Trial], seconds: float, seeds: Iterator[int]) -> tup
 
 def _rendered(trials: list[Trial], spp: int, count: int, seeds: Iterator[int], tell: Step) -> list[Tested]:
     """The combinations with `count` rounds each, or those complete at a Ctrl-C, of which two are enough."""
-    tested = [Tested(options_of(t), names_in_force(t.session), t.session.needs_bound()) for t in trials]
+    tested = [
+        Tested(options_of(t), names_in_force(t.session.plan), t.session.plan.needs_bound) for t in trials
+    ]
     rendered: list[list[Result]] = []
     tell("rounds", 0, count)
     try:

@@ -41,21 +41,21 @@ class Trial:
         """Build and upload; OptionError for a combination that cannot be right."""
         session = Session.for_scene(device, scene, choices, 0)
         precompute = session.setup_seconds - session.kernel_seconds
-        return cls(session, choices, session.choices(), precompute)
+        return cls(session, choices, dict(session.plan.in_force), precompute)
 
     @property
     def biased(self) -> bool:
         """Whether what it came to is labelled as biased."""
-        return bool(self.session.biased())
+        return bool(self.session.plan.biased)
 
     @property
     def options(self) -> str:
         """The options of `clvol render` that repeat it, without those it has no use for."""
-        config = self.session.config
+        chosen = self.session.plan.chosen
         used = {
             family: name
             for family, name in self.names.items()
-            if name in FAMILIES[family] and name == getattr(config, family)
+            if name in FAMILIES[family] and name == chosen[family]
         }
         return " ".join(f"--{family} {name}" for family, name in used.items())
 

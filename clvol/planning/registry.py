@@ -8,9 +8,13 @@ from __future__ import annotations
 
 import difflib
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from clvol.errors import OptionError, shown
 from clvol.layout import COUNTS
+
+if TYPE_CHECKING:
+    from clvol.accel.controls import Control
 
 
 @dataclass(frozen=True)
@@ -31,7 +35,7 @@ class Choice:
     all_channels: bool = False
     weighted: bool = False
     needs_bound: bool = False
-    control: str = "none"
+    control: Control = "none"
     walks_majorant: bool = True
     linear: bool = True
     biased: bool = False

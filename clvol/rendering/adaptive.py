@@ -159,7 +159,7 @@ class TargetRender:
         self.wavefront = session.wavefront
         self.picture = self.wavefront.film
         self.pilot = self.wavefront.new_film(seed_words((session.seed + _PILOT_SEED) % 2**64))
-        self.low_discrepancy = bool(session.config.randomizations)
+        self.low_discrepancy = bool(session.plan.randomizations)
         self.rounding = powers_of_two if self.low_discrepancy else chunks
         self.expected: float | None = None
         """Mean of the samples that the picture will have, by the last plan."""

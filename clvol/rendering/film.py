@@ -12,7 +12,7 @@ import pyopencl as cl
 from clvol import layout
 from clvol.device.device import Device
 from clvol.picture.estimate import Estimate, Moments, Replicates, Uneven
-from clvol.planning.config import KernelConfig
+from clvol.planning.plan import Plan
 from clvol.tables.sobol import samples_of_each
 
 _READ_PIXELS = 1 << 18
@@ -29,13 +29,13 @@ class Film:
     pixels : of the picture.
     """
 
-    def __init__(self, device: Device, config: KernelConfig, pixels: int, seed: tuple[int, int]) -> None:
-        self.device, self.config, self.pixels, self.seed = device, config, pixels, seed
-        self.path_counts = layout.path_counts(config.macros)
-        self.firsts = layout.first_hit_fields(config.macros)
-        self.peaks = 1 + layout.shows_weight(config.macros)
+    def __init__(self, device: Device, plan: Plan, pixels: int, seed: tuple[int, int]) -> None:
+        self.device, self.plan, self.pixels, self.seed = device, plan, pixels, seed
+        self.path_counts = layout.path_counts(plan.macros)
+        self.firsts = layout.first_hit_fields(plan.macros)
+        self.peaks = 1 + layout.shows_weight(plan.macros)
         sizes = {
-            "film": 8 * (config.randomizations or 2) * config.channels * pixels,
+            "film": 8 * (plan.randomizations or 2) * plan.channels * pixels,
             "film_peaks": 4 * self.peaks * pixels,
         }
         if self.path_counts:
@@ -53,9 +53,9 @@ class Film:
         self.seed = seed
         for buffer in self.buffers.values():
             cl.enqueue_fill_buffer(self.device.queue, buffer, np.uint32(0), 0, buffer.size)
-        listed = self.pixels if self.config.pixel_list else 0
+        listed = self.pixels if self.plan.pixel_list else 0
         self.samples = np.zeros(listed, np.int64)  # of each pixel, where they are not the same of all
-        self.slot_totals = dict.fromkeys(layout.slot_fields(self.config.macros), 0.0)
+        self.slot_totals = dict.fromkeys(layout.slot_fields(self.plan.macros), 0.0)
 
     def _read(self, name: str, shape: tuple[int, ...], dtype: type) -> np.ndarray:
         array = np.empty(shape, dtype)
@@ -67,7 +67,7 @@ class Film:
 
         Read a part of the pixels at a time: the device's pairs of floats take as much as the sums.
         """
-        parts, channels = self.config.randomizations or 2, self.config.channels
+        parts, channels = self.plan.randomizations or 2, self.plan.channels
         sums = np.empty((parts, self.pixels, channels))
         for first in range(0, self.pixels, _READ_PIXELS):
             count = min(_READ_PIXELS, self.pixels - first)
@@ -87,7 +87,7 @@ class Film:
         return self._estimate(self._sums(), first, count)
 
     def _estimate(self, sums: np.ndarray, first: int, count: int) -> Moments | Replicates:
-        if self.config.randomizations:
+        if self.plan.randomizations:
             return Replicates(sums, samples_of_each(first, count))
         return Moments(sums[0], sums[1], count)
 

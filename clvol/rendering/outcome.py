@@ -13,7 +13,6 @@ from clvol.picture.result import Result, said_ranges
 from clvol.planning import registry
 from clvol.rendering.session import Session
 from clvol.scene.digest import scene_digest
-from clvol.tables.apart import extinction_ratio
 from clvol.version import __version__
 
 log = logging.getLogger("clvol")
@@ -25,7 +24,7 @@ def make_result(session: Session, first: int, count: int) -> Result:
     """The film as a Result; of samples `first` to `first + count`, or of as many as each listed pixel got."""
     film, window = session.wavefront.film, session.prepared.scene.film.window
     shape = window[3], window[2]
-    if session.config.pixel_list:
+    if session.plan.pixel_list:
         estimate, samples = film.uneven_estimate(), film.samples
     else:
         estimate, samples = film.estimate(first, count), np.full(film.pixels, count)
@@ -41,7 +40,7 @@ def make_result(session: Session, first: int, count: int) -> Result:
 
 def _warn_of_unseen(session: Session, result: Result) -> None:
     """Say where the samples do not show the noise that there may be."""
-    features = session.config.features
+    features = session.plan.features
     if result.stats["largest_sample"] == 0 and (features.emitters or features.emission):
         log.warning("no sample met any light: the picture may be black by chance, its noise is unknown")
     elif result.met_nothing and not result.variance.any():
@@ -53,19 +52,17 @@ def _warn_of_unseen(session: Session, result: Result) -> None:
 
 def _metadata(session: Session, first: int, samples: np.ndarray) -> dict[str, Any]:
     """How the picture was made."""
-    scene, needs, biased = session.prepared.scene, session.prepared.needs, session.biased()
+    scene, plan = session.prepared.scene, session.plan
+    biased, scale = plan.biased, plan.choices.majorant_scale
+    apart = plan.settled.channels_apart if plan.settled and plan.mixes_far_channels else None
     even = samples.min() == samples.max()
     return {
         "scene": scene.source,
         "digest": scene_digest(scene),
-        **session.choices(),
-        **({"majorant_scale": needs.scale} if needs.scale != 1 else {}),
-        **({"biased": ", ".join(biased), "step": session.step or "voxel"} if biased else {}),
-        **(
-            {"channels_apart": f"1 : {extinction_ratio(session.prepared):.3g}"}
-            if session.mixes_far_channels()
-            else {}
-        ),
+        **plan.in_force,
+        **({"majorant_scale": scale} if scale != 1 else {}),
+        **({"biased": ", ".join(biased), "step": plan.choices.step or "voxel"} if biased else {}),
+        **({"channels_apart": f"1 : {apart:.3g}"} if apart else {}),
         "spp": int(samples[0]) if even else round(float(samples.mean()), 3),
         **said_ranges(((first, int(samples.max())),)),
         "seed": session.seed,
@@ -77,13 +74,13 @@ def _metadata(session: Session, first: int, samples: np.ndarray) -> dict[str, An
 
 def _pictures(session: Session, samples: np.ndarray, estimate: Estimate) -> dict[str, np.ndarray]:
     """Look-ups and what `aov` asks for: means per sample, and the largest weight; float32 (pixels[, 3])."""
-    film, config = session.wavefront.film, session.config
+    film, plan = session.wavefront.film, session.plan
     sums, peaks, nothing = film.counts(), film.peaks_by_pixel(), np.zeros(film.pixels)
     counts = {name: total / np.maximum(samples, 1) for name, total in sums.items()}
     found = {}
-    for name in dict.fromkeys(("lookups", *config.aov, *(["samples"] if config.pixel_list else []))):
+    for name in dict.fromkeys(("lookups", *plan.choices.aov, *(["samples"] if plan.pixel_list else []))):
         if name in registry.FIRST_HIT:
-            values = _first_hit(session, name, np.maximum(samples, 1) * config.jobs_per_sample)
+            values = _first_hit(session, name, np.maximum(samples, 1) * plan.jobs_per_sample)
         elif name == "largest_weight":
             values = peaks.get(name, np.ones(film.pixels))
         elif name == "null":
@@ -141,7 +138,7 @@ def statistics(session: Session, samples: int) -> dict[str, Any]:
     peaks = {n: float(p.max(initial=0.0)) for n, p in film.peaks_by_pixel().items()}
     counts = {n: int(slots.get(n, 0)) for n in layout.COUNTS}
     counts |= {n: int(c.sum()) for n, c in film.counts().items()}
-    paths = samples * session.config.jobs_per_sample
+    paths = samples * session.plan.jobs_per_sample
     stats = {
         "paths": paths,
         "lookups": counts["lookups"],
@@ -180,7 +177,7 @@ def statistics(session: Session, samples: int) -> dict[str, Any]:
 
 def _warn(session: Session, stats: dict[str, Any]) -> None:
     """Log what leaves the picture wrong, or noisier than it looks."""
-    features = session.config.features
+    features = session.plan.features
     if features.heterogeneous and not stats["lookups"] and not features.homogeneous:
         log.warning("no path met any density: are the transforms right?")
     for name in ("non_finite", "walks_exhausted"):
@@ -192,7 +189,7 @@ def _warn(session: Session, stats: dict[str, Any]) -> None:
             stats["majorant_violations"],
             stats["lookups"],
             "the picture is biased"
-            if session.needs_bound()
+            if session.plan.needs_bound
             else "these techniques stay unbiased, at more noise",
         )
     if stats["largest_weight"] > LARGE_WEIGHT:

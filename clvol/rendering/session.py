@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,16 +16,16 @@ from clvol.device.device import Device
 from clvol.device.programs import build_stages
 from clvol.errors import RenderError
 from clvol.picture.result import relative_noise
-from clvol.planning import registry
-from clvol.planning.choices import Choices, prepare_for, resolve
-from clvol.planning.config import KernelConfig
+from clvol.planning.choices import Choices
+from clvol.planning.in_force import warnings
+from clvol.planning.plan import Plan
+from clvol.planning.settled import Tuning
 from clvol.rendering.upload import upload_scene
 from clvol.rendering.wavefront import Pool, Progressed, Wavefront
 from clvol.scene.records import Scene
-from clvol.tables.apart import FAR_APART, extinction_ratio
 from clvol.tables.camera import camera_rays
 from clvol.tables.pixel_filter import FILTER_BINS
-from clvol.tables.prepare import PreparedScene
+from clvol.tables.prepare import PreparedScene, prepare
 
 log = logging.getLogger("clvol")
 MAX_SAMPLES = 2**32 - 1
@@ -34,49 +34,72 @@ MAX_SAMPLES = 2**32 - 1
 
 @dataclass(eq=False)
 class Session:
-    """One scene, ready on one device with one set of choices."""
+    """One scene, ready on one device with one plan.
+
+    Parameters
+    ----------
+    setup_seconds : from the scene's records to buffers and kernels.
+    kernel_seconds : the part of it that went into building kernels, nothing where a cache has them.
+    seconds : that the last run took.
+    """
 
     device: Device
     prepared: PreparedScene
-    config: KernelConfig
     wavefront: Wavefront
     seed: int
-    step: float | None = None
     setup_seconds: float = 0.0
-    """From the scene's records to buffers and kernels."""
     kernel_seconds: float = 0.0
-    """The part of it that went into building kernels, nothing where a cache has them."""
+    seconds: float = 0.0
 
     @classmethod
     def for_scene(
         cls, device: Device, scene: Scene, choices: Choices, seed: int, pool: int | None = None
     ) -> Session:
-        """Prepare a scene for `choices` and open it."""
+        """Plan a scene's render with `choices`, and open it."""
+        started = time.perf_counter()
+        plan = Plan.of(scene, choices)
+        return cls.for_plan(device, scene, plan, seed, pool, time.perf_counter() - started)
+
+    @classmethod
+    def for_plan(
+        cls,
+        device: Device,
+        scene: Scene,
+        plan: Plan,
+        seed: int,
+        pool: int | None = None,
+        spent: float = 0.0,
+    ) -> Session:
+        """Prepare a scene as planned, and open it; `spent`: seconds that went into the plan."""
         check_seed(seed)
         started = time.perf_counter()
-        prepared = prepare_for(scene, choices)
+        prepared = prepare(scene, plan)
         prepared_after = time.perf_counter() - started
-        session = cls.open(device, prepared, choices, seed, pool)
-        session.setup_seconds += prepared_after
+        session = cls.open(device, prepared, seed, pool)
+        session.setup_seconds += spent + prepared_after
         return session
 
     @classmethod
-    def open(
-        cls, device: Device, prepared: PreparedScene, choices: Choices, seed: int, pool: int | None = None
-    ) -> Session:
+    def open(cls, device: Device, prepared: PreparedScene, seed: int, pool: int | None = None) -> Session:
         """Compose and build the kernels, upload the scene, allocate the pool."""
         started = time.perf_counter()
-        config = kernel_config(prepared, choices, device)
-        kernels = build_stages(device, config)
+        prepared = on_device(prepared, device)
+        plan = prepared.plan
+        kernels = build_stages(device, plan)
         built = time.perf_counter()
-        buffers = upload_scene(device, prepared, config, choices.step)
+        buffers = upload_scene(device, prepared)
         record = render_record(prepared, seed)
-        wavefront = Wavefront(device, config, kernels, buffers, record, Pool.for_device(device, config, pool))
+        wavefront = Wavefront(device, plan, kernels, buffers, record, Pool.for_device(device, plan, pool))
         warming = time.perf_counter()
         wavefront.warm_up()
         ready = time.perf_counter()
         kernel_seconds = built - started + ready - warming
-        return cls(device, prepared, config, wavefront, seed, choices.step, ready - started, kernel_seconds)
+        return cls(device, prepared, wavefront, seed, ready - started, kernel_seconds)
+
+    @property
+    def plan(self) -> Plan:
+        """What is compiled, launched and allocated."""
+        return self.prepared.plan
 
     def restart(self, seed: int) -> None:
         """Forget the picture; the next run draws another seed's samples with the same kernels and buffers."""
@@ -84,17 +107,12 @@ class Session:
         self.wavefront.restart(seed_words(seed))
 
     def describe(self) -> None:
-        """Log what was found and built."""
-        wavefront, config = self.wavefront, self.config
+        """Log the plan, and what it comes to on the device."""
+        wavefront = self.wavefront
         log.info("device: %s", self.device.description)
-        log.info("features: %s", config.features.found())
-        log.info("choices: %s", ", ".join(f"{k} {v}" for k, v in self.choices().items()))
-        log.info("units built: %s, accumulate", ", ".join(config.stages))
-        log.info(
-            "path state: %d bytes per slot (%s)",
-            4 * len(wavefront.fields),
-            ", ".join(f.name for f in wavefront.fields),
-        )
+        if log.isEnabledFor(logging.INFO):
+            for line in self.plan.describe():
+                log.info("%s", line)
         log.info(
             "pool: %d slots in %d groups; %.1f MiB on the device",
             wavefront.pool.slots,
@@ -102,66 +120,10 @@ class Session:
             wavefront.bytes / 2**20,
         )
 
-    def warn_of_unused(self, asked: dict[str, str]) -> None:
-        """Say which of the caller's own choices this scene has no use for, and what leaves it black."""
-        used = self.choices()
-        for family, value in asked.items():
-            if value not in ("auto", used[family]):
-                reason = f"the scene's media need only the {used[family]} rule"
-                if used[family] == "none":
-                    reason = f"nothing in this render needs {'an' if family[0] in 'aeiou' else 'a'} {family}"
-                log.warning("%s %s is not used: %s", family, value, reason)
-        if self.prepared.needs.scale != 1 and used["majorant"] == "none":
-            log.warning("majorant_scale is not used: nothing in this render walks a majorant")
-        if not self.config.features.emitters and not self.config.features.emission:
-            log.warning("the scene has no emitter: its picture is black")
-        if self.mixes_far_channels():
-            log.warning(
-                "extinctions of the channels differ by 1 : %.2g, and technique %s follows them with one "
-                "path: most of what the thinnest scatters may never be sampled, nor the error show it; "
-                "technique auto or delta has a path for each channel",
-                extinction_ratio(self.prepared),
-                self.config.technique,
-            )
-        for what in self.biased():
-            log.warning("%s is BIASED: the picture's mean is off by an unknown amount", what)
-
-    def choices(self) -> dict[str, str]:
-        """The choices in force; "none" where the scene has no use for one."""
-        config, features = self.config, self.config.features
-        walks = features.heterogeneous
-        analytic = "analytic" if features.homogeneous else "none"
-        chooses = config.spectrum == 3 and (config.extinction == 3 or config.absorption == "sample")
-        return {
-            "technique": config.technique if walks else analytic,
-            "transmittance": (config.transmittance if walks else analytic) if config.nee else "none",
-            "majorant": config.majorant if config.walks_majorants else "none",
-            "lookup": config.lookup
-            if walks and not (features.nearest and not features.trilinear)
-            else "none",
-            "absorption": config.absorption if features.media and features.scattering else "none",
-            "probability": config.probability if walks and config.weighted and chooses else "none",
-            "control": config.control if config.needs_residuals else "none",
-            "sampler": config.sampler,
-        }
-
-    def biased(self) -> list[str]:
-        """The choices in force whose pictures are biased, as "family name"."""
-        used = self.choices()
-        families = {"technique": registry.TECHNIQUES, "transmittance": registry.TRANSMITTANCES}
-        return [
-            f"{f} {used[f]}" for f, table in families.items() if used[f] in table and table[used[f]].biased
-        ]
-
-    def mixes_far_channels(self) -> bool:
-        """Whether one path follows channels whose extinctions are too far apart for it."""
-        return self.config.far_apart and self.config.extinction == 3
-
-    def needs_bound(self) -> bool:
-        """Whether a choice in force is right only where majorants bound the density."""
-        used = self.choices()
-        families = {"technique": registry.TECHNIQUES, "transmittance": registry.TRANSMITTANCES}
-        return any(used[f] in table and table[used[f]].needs_bound for f, table in families.items())
+    def warn(self, asked: Mapping[str, str]) -> None:
+        """Say what a user should hear of; `asked`: names that the caller gave, by family."""
+        for warning in warnings(self.plan, asked):
+            log.warning("%s", warning)
 
     def run(
         self,
@@ -209,23 +171,10 @@ def nothing_finished(urgency: int) -> BaseException:
     )
 
 
-def kernel_config(prepared: PreparedScene, choices: Choices, device: Device) -> KernelConfig:
-    """What is compiled: `auto` resolved by fixed rules, the launch tuned for the kind of device."""
-    resolved = resolve(prepared.features, choices.names)
-    tuning = (
-        {"local_size": 1, "group_slots": 256} if device.is_cpu else {"local_size": 128, "group_slots": 1024}
-    )
-    return KernelConfig(
-        prepared.features,
-        majorant=prepared.majorant,
-        top_trees=any(volume.bricks.levels for volume in prepared.volumes.values()),
-        tree_grid=any(found.links is not None for found in prepared.majorants.values()),
-        aov=choices.aov,
-        far_apart=extinction_ratio(prepared) > FAR_APART,
-        pixel_list=choices.target_error is not None,
-        **resolved,
-        **tuning,
-    )
+def on_device(prepared: PreparedScene, device: Device) -> PreparedScene:
+    """With its plan tuned for the kind of device."""
+    tuning = Tuning(1, 256) if device.is_cpu else Tuning(128, 1024)
+    return replace(prepared, plan=prepared.plan.tune(tuning))
 
 
 def seed_words(seed: int) -> tuple[int, int]:
@@ -242,8 +191,8 @@ def render_record(prepared: PreparedScene, seed: int) -> np.ndarray:
     record["seed"] = seed_words(seed)
     record["max_depth"] = scene.integrator.max_depth & 0xFFFFFFFF
     record["rr_depth"] = scene.integrator.rr_depth
-    record["emitters"] = prepared.features.emitters
-    record["media"] = prepared.features.media
+    record["emitters"] = prepared.plan.features.emitters
+    record["media"] = prepared.plan.features.media
     if prepared.surfaces is not None:
         record["triangles"] = len(prepared.surfaces.faces)
     record["filter_radius"] = scene.film.rfilter.radius

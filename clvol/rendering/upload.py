@@ -12,7 +12,6 @@ import pyopencl as cl
 from clvol import layout
 from clvol.device.device import Device
 from clvol.layout import BRICK_SAMPLES
-from clvol.planning.config import KernelConfig
 from clvol.tables.blackbody import blackbody_table
 from clvol.tables.lights import LightTable, emitter_order, envmap_arrays, light_table
 from clvol.tables.materials import material_table
@@ -22,27 +21,22 @@ from clvol.tables.prepare import PreparedScene
 from clvol.tables.sobol import block_table
 
 
-def upload_scene(
-    device: Device, prepared: PreparedScene, config: KernelConfig, step: float | None = None
-) -> dict[str, cl.Buffer]:
-    """Buffers of every scene argument that `config` needs, by argument name.
-
-    `step` is the world length of a step of ray marching; None takes the least edge of a voxel.
-    """
-    volumes = {key: number for number, key in enumerate(prepared.volumes)}
+def upload_scene(device: Device, prepared: PreparedScene) -> dict[str, cl.Buffer]:
+    """Buffers of every scene argument that the plan needs, by argument name."""
     emitters = emitter_order(prepared.scene)
     buffers: dict[str, cl.Buffer] = {}
-    needed = {argument.name for argument in layout.arguments(config.macros)}
+    needed = {argument.name for argument in layout.arguments(prepared.plan.macros)}
     if "sobol" in needed:
         buffers["sobol"] = _buffer(device, block_table())
     if "volumes" in needed:
         buffers |= _volume_buffers(device, prepared)
     if "media" in needed:
-        buffers["media"] = _buffer(device, medium_table(prepared, volumes, step))
+        buffers["media"] = _buffer(device, medium_table(prepared))
     if "boundary_masks" in needed:
         buffers["boundary_masks"] = _buffer(device, prepared.boundaries.masks())
     entries = prepared.boundaries.entries
-    majorants = [prepared.majorants[id(e.medium)] for e in entries if id(e.medium) in prepared.majorants]
+    tables = (prepared.majorants[number] for number in prepared.matter.of_entry)
+    majorants = [table for table in tables if table is not None]
     if "majorants" in needed:
         buffers["majorants"] = _buffer(device, np.concatenate([m.majorant for m in majorants]))
     if "majorant_links" in needed:
@@ -115,7 +109,7 @@ def _volume_buffers(device: Device, prepared: PreparedScene) -> dict[str, cl.Buf
     """Records, top grids and the brick pool of every volume."""
     table = np.zeros(len(prepared.volumes), layout.VOLUME)
     tops, brick_offset, top_offset = [], 0, 0
-    for record, volume in zip(table, prepared.volumes.values(), strict=True):
+    for record, volume in zip(table, prepared.volumes, strict=True):
         bricks = volume.bricks
         record["world_to_index"] = rows_3x4(volume.world_to_index)
         record["size"], record["channels"] = bricks.size, bricks.channels
@@ -132,7 +126,7 @@ def _volume_buffers(device: Device, prepared: PreparedScene) -> dict[str, cl.Buf
         "the scene's volumes",
         "use a device with more memory, or a volume of lower resolution",
     )
-    for record, volume in zip(table, prepared.volumes.values(), strict=True):
+    for record, volume in zip(table, prepared.volumes, strict=True):
         for first, samples in volume.bricks.stored():
             at = (int(record["brick_offset"]) + first * volume.bricks.channels) * BRICK_SAMPLES * 4
             cl.enqueue_copy(device.queue, pool, samples, dst_offset=at, is_blocking=True)

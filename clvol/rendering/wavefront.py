@@ -19,7 +19,7 @@ import pyopencl as cl
 from clvol import layout
 from clvol.device.device import Device, set_arguments
 from clvol.errors import OptionError
-from clvol.planning.config import KernelConfig
+from clvol.planning.plan import Plan
 from clvol.rendering.film import Film
 
 log = logging.getLogger("clvol")
@@ -45,14 +45,14 @@ class Pool:
     ring_passes: int = 4
 
     @classmethod
-    def for_device(cls, device: Device, config: KernelConfig, slots: int | None = None) -> Pool:
+    def for_device(cls, device: Device, plan: Plan, slots: int | None = None) -> Pool:
         """Pool for a device; `slots` is rounded up to whole groups."""
         if slots is None:
             slots = 8192 if device.is_cpu else 1 << 20
         if not 1 <= slots <= 1 << 26:
             raise OptionError(f"a pool of {slots} paths", hint="give 1 to 67108864")
-        groups = max(1, -(-slots // config.group_slots))
-        slots = groups * config.group_slots
+        groups = max(1, -(-slots // plan.tuning.group_slots))
+        slots = groups * plan.tuning.group_slots
         return cls(slots, pass_jobs=4 * slots)
 
 
@@ -77,23 +77,23 @@ class Wavefront:
     def __init__(
         self,
         device: Device,
-        config: KernelConfig,
+        plan: Plan,
         kernels: dict[str, cl.Kernel],
         buffers: dict[str, cl.Buffer],
         render: np.ndarray,
         pool: Pool,
     ) -> None:
-        self.device, self.config, self.kernels, self.pool = device, config, kernels, pool
+        self.device, self.plan, self.kernels, self.pool = device, plan, kernels, pool
         self.render = render
         self.pixels = int(render["film_size"][0, 0]) * int(render["film_size"][0, 1])
         self.buffers: dict[str, cl.Buffer] = {}
         self.list_pixels(None)
-        self.groups = pool.slots // config.group_slots
-        self.fields = layout.path_fields(config.macros)
+        self.groups = pool.slots // plan.tuning.group_slots
+        self.fields = layout.path_fields(plan.macros)
         self.film = self.new_film(tuple(int(word) for word in render["seed"][0]))
         self._harvested = time.perf_counter()
         self.stride = pool.slots + 16  # off the power of two, or all fields of a slot share a cache set
-        self.seconds = dict.fromkeys((*config.stages, "accumulate"), 0.0)
+        self.seconds = dict.fromkeys((*plan.stages, "accumulate"), 0.0)
         self.launches = self.waves = 0
         self._allocate(buffers)
 
@@ -106,13 +106,13 @@ class Wavefront:
             "queues": 4 * len(layout.QUEUES) * self.pool.slots,
             "counts": 4 * layout.COUNTER_STRIDE * self.groups,
             "control": 4 * (_DONE + self.pool.ring_passes),
-            "results": 4 * self.config.channels * ring_jobs // self.config.jobs_per_sample,
+            "results": 4 * self.plan.channels * ring_jobs // self.plan.jobs_per_sample,
         }
         if self.film.firsts:
             sizes["result_firsts"] = 4 * len(self.film.firsts) * ring_jobs
-        if self.config.pixel_list:
+        if self.plan.pixel_list:
             sizes["pixel_list"] = 8 * self.pixels
-        if stride := layout.counts_per_path(self.config.macros):
+        if stride := layout.counts_per_path(self.plan.macros):
             sizes["result_counts"] = 4 * stride * ring_jobs
         self.buffers = {name: self._buffer(size) for name, size in sizes.items()} | scene_buffers
         self.bytes = sum(sizes.values()) + sum(b.size for b in scene_buffers.values())
@@ -122,9 +122,9 @@ class Wavefront:
         self._write("control", np.zeros(_DONE + self.pool.ring_passes, np.uint32))
         values = [
             np.uint32(self.stride) if argument.name == "slot_stride" else self.buffers[argument.name]
-            for argument in layout.arguments(self.config.macros)
+            for argument in layout.arguments(self.plan.macros)
         ]
-        for stage in self.config.stages:
+        for stage in self.plan.stages:
             set_arguments(self.kernels[stage], *values)
         self.list_pixels(None)
 
@@ -137,7 +137,7 @@ class Wavefront:
 
     def new_film(self, seed: tuple[int, int]) -> Film:
         """An empty film for samples of another seed."""
-        return Film(self.device, self.config, self.pixels, seed)
+        return Film(self.device, self.plan, self.pixels, seed)
 
     def use_film(self, film: Film) -> None:
         """Go on with another film, which the next run adds to."""
@@ -157,12 +157,12 @@ class Wavefront:
     def list_pixels(self, pixels: np.ndarray | None) -> None:
         """What the next run renders: these pixels, each from the first sample on that its film lacks.
 
-        int (n,), or None for all; a list needs kernels with `config.pixel_list`.
+        int (n,), or None for all; a list needs kernels with `plan.pixel_list`.
         """
         self.listed = self.pixels if pixels is None else len(pixels)
-        self.sample_jobs = self.listed * self.config.jobs_per_sample  # of one sample of each
+        self.sample_jobs = self.listed * self.plan.jobs_per_sample  # of one sample of each
         self.pass_samples = max(1, self.pool.pass_jobs // self.sample_jobs)
-        if self.config.pixel_list and self.buffers:
+        if self.plan.pixel_list and self.buffers:
             chosen = np.arange(self.pixels) if pixels is None else pixels
             entries = np.stack([chosen, self.film.samples[chosen]], axis=1).astype(np.uint32)
             self._write("pixel_list", entries)
@@ -275,7 +275,7 @@ class Wavefront:
         control[_NON_FINITE] = self.non_finite()  # counts over all rounds
         self._write("control", control)
         counts = np.zeros((self.groups, layout.COUNTER_STRIDE), np.uint32)
-        counts[:, len(layout.QUEUES)] = self.config.group_slots  # all slots idle
+        counts[:, len(layout.QUEUES)] = self.plan.tuning.group_slots  # all slots idle
         self._write("counts", counts)
 
     def _launch(self, waves: int) -> tuple[int, float]:
@@ -283,15 +283,15 @@ class Wavefront:
 
         One wave is queued behind the one that runs, so that a batch that turns out long can be cut.
         """
-        queue, size = self.device.queue, (self.groups * self.config.local_size,)
-        local = (self.config.local_size,)
+        queue, size = self.device.queue, (self.groups * self.plan.tuning.local_size,)
+        local = (self.plan.tuning.local_size,)
         launched: list[list[cl.Event]] = []
         start = time.perf_counter()
         while len(launched) < waves:
             launched.append(
                 [
                     cl.enqueue_nd_range_kernel(queue, self.kernels[stage], size, local)
-                    for stage in self.config.stages
+                    for stage in self.plan.stages
                 ]
             )
             if len(launched) > 1:
@@ -299,11 +299,11 @@ class Wavefront:
                 if time.perf_counter() - start > 2 * _BATCH_SECONDS:
                     break
         launched[-1][-1].wait()
-        self.launches += len(launched) * len(self.config.stages)
+        self.launches += len(launched) * len(self.plan.stages)
         self.waves += len(launched)
         total = 0.0
         for events in launched:
-            for stage, event in zip(self.config.stages, events, strict=True):
+            for stage, event in zip(self.plan.stages, events, strict=True):
                 seconds = 1e-9 * (event.profile.end - event.profile.start)
                 self.seconds[stage] += seconds
                 total += seconds
@@ -325,7 +325,7 @@ class Wavefront:
             *((self.buffers["result_counts"],) if "result_counts" in self.buffers else ()),
             *((film["film_counts"],) if "film_counts" in film else ()),
             *((self.buffers["result_firsts"], film["film_firsts"]) if "film_firsts" in film else ()),
-            *((self.buffers["pixel_list"],) if self.config.pixel_list else ()),
+            *((self.buffers["pixel_list"],) if self.plan.pixel_list else ()),
             self.buffers["control"],
             np.uint32(ring_pass),
             np.uint32(self.pass_samples * self.sample_jobs),

@@ -1,6 +1,6 @@
 """What a scene is once it is read: plain frozen records, in double precision, in world space.
 
-The loader makes them, `Features.from_scene` inspects them, `upload` turns them into device buffers.
+The loader makes them, `clvol.planning` inspects them, `clvol.tables` turns them into what the device reads.
 Nothing here knows Mitsuba's syntax or OpenCL.  All 4x4 matrices are float64 arrays that map column
 vectors from local to world space (``world = M @ local``).
 """

@@ -7,16 +7,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol import layout
-from clvol.planning.features import bounding_kind, is_homogeneous
 from clvol.scene import records
 from clvol.scene.boundaries import MediumEntry, entry_bounds, is_clipped
+from clvol.scene.medium_facts import bounding_kind, is_homogeneous
 from clvol.scene.phase import phase_lobes
 from clvol.scene.thinness import thin_media
 from clvol.tables.apart import peak_extinction
 from clvol.tables.blackbody import blackbody_rgb
 
 if TYPE_CHECKING:
-    from clvol.tables.prepare import PreparedScene, PreparedVolume
+    from clvol.tables.prepare import PreparedScene
+    from clvol.tables.volumes import PreparedVolume
 
 BOUND_SLACK = 1e-5
 """Share of its size by which a medium's world box exceeds the boundaries that hold it."""
@@ -31,20 +32,20 @@ def _rgb(value: tuple[float, ...]) -> np.ndarray:
     return np.broadcast_to(np.asarray(value, np.float64), 3)
 
 
-def medium_table(prepared: PreparedScene, volumes: dict[int, int], step: float | None) -> np.ndarray:
-    """MEDIUM records of a scene's media, in the order of its entries.
-
-    volumes : number of each volume, by id().  step : world length of a marching step; None: a voxel's edge.
-    """
-    entries = prepared.boundaries.entries
+def medium_table(prepared: PreparedScene) -> np.ndarray:
+    """MEDIUM records of a scene's media, in the order of its entries."""
+    entries, matter = prepared.boundaries.entries, prepared.matter
     table = np.zeros(len(entries), layout.MEDIUM)
     cell_offset = kd_root = links_first = phase_first = 0
     sky, suns = mean_incident_radiance(prepared.scene)
     alone = prepared.surfaces is None
     boxes = entry_bounds(prepared.scene, prepared.boundaries)
     thin = thin_media(prepared.scene, prepared.boundaries)
-    for record, entry, box, is_thin in zip(table, entries, boxes, thin, strict=True):
-        medium = entry.medium
+    numbered = zip(table, entries, matter.of_entry, boxes, thin, strict=True)
+    for record, entry, number, box, is_thin in numbered:
+        medium, roles = entry.medium, matter.roles[number]
+        sigma_t = medium.sigma_t
+        majorant, volume = prepared.majorants[number], prepared.density(number)
         record["thin"] = int(is_thin)
         record["presence"] = int(entry.shape is not None or entry.everywhere)
         if entry.shape is not None:
@@ -55,27 +56,29 @@ def medium_table(prepared: PreparedScene, volumes: dict[int, int], step: float |
         record["phase_first"], record["phase_count"] = phase_first, len(phase_lobes(medium.phase))
         phase_first += record["phase_count"]
         record["sample_emitters"] = int(medium.sample_emitters)
-        _emission(record, medium, volumes)
-        caught = -np.expm1(-most_depth(prepared, medium, box))  # a sun is seen in what scatters it alone
+        _emission(record, medium, roles)
+        depth = most_depth(peak_extinction(medium, volume), box)
+        caught = -np.expm1(-depth)  # a sun is seen in what scatters it alone
         record["background"] = (sky + suns * caught) * expected_albedo(medium) * alone
-        record["sigma_t_volume"] = volumes.get(id(medium.sigma_t), -1)
-        record["albedo_volume"] = volumes.get(id(medium.albedo), -1)
+        record["sigma_t_volume"] = roles.get("sigma_t", -1)
+        record["albedo_volume"] = roles.get("albedo", -1)
         if isinstance(medium.albedo, records.ConstVolume):
             record["albedo"] = _rgb(medium.albedo.value)
-        if is_homogeneous(medium):
-            record["sigma_t"] = _rgb(medium.sigma_t.value) * _rgb(medium.scale)
-            record["box_from_world"] = rows_3x4(_from_centred(medium.sigma_t.to_world, prepared.centre))
+        if isinstance(sigma_t, records.ConstVolume):
+            record["sigma_t"] = _rgb(sigma_t.value) * _rgb(medium.scale)
+            record["box_from_world"] = rows_3x4(_from_centred(sigma_t.to_world, prepared.centre))
             record["box_upper"] = 1.0
             if medium.homogeneous and entry.shape is None and not entry.everywhere:
                 _clip_to(record, box, prepared.centre)
             continue
-        majorant, volume = prepared.majorants[id(medium)], prepared.volumes[id(medium.sigma_t)]
-        to_brick = volume.world_to_index @ _centred(medium.sigma_t.index_to_world, prepared.centre)
+        assert majorant is not None
+        assert volume is not None
+        to_brick = volume.world_to_index @ _centred(sigma_t.index_to_world, prepared.centre)
         record["sigma_t"] = _rgb(medium.scale)
         record["box_from_world"] = rows_3x4(volume.world_to_index)
-        record["box_lower"] = (to_brick @ [*medium.sigma_t.lower, 1.0])[:3]
-        record["box_upper"] = (to_brick @ [*medium.sigma_t.upper, 1.0])[:3]
-        record["march_step"] = step or voxel_edges(volume).min()
+        record["box_lower"] = (to_brick @ [*sigma_t.lower, 1.0])[:3]
+        record["box_upper"] = (to_brick @ [*sigma_t.upper, 1.0])[:3]
+        record["march_step"] = prepared.plan.choices.step or voxel_edges(volume).min()
         record["majorant"] = majorant.majorant.max()
         record["bound"] = max(record["majorant"], volume.bricks.peak.max())
         record["cells"], record["cell_size"] = majorant.cells, majorant.cell_size
@@ -107,7 +110,8 @@ def phase_table(entries: tuple[MediumEntry, ...]) -> np.ndarray:
 
 def voxel_edges(volume: PreparedVolume) -> np.ndarray:
     """World lengths of a voxel's edges, float64 (3,)."""
-    return np.linalg.norm(np.linalg.inv(volume.world_to_index)[:3, :3], axis=0)
+    edges: np.ndarray = np.linalg.norm(np.linalg.inv(volume.world_to_index)[:3, :3], axis=0)
+    return edges
 
 
 def mean_incident_radiance(scene: records.Scene) -> tuple[np.ndarray, np.ndarray]:
@@ -132,13 +136,14 @@ def mean_incident_radiance(scene: records.Scene) -> tuple[np.ndarray, np.ndarray
     return sky, suns
 
 
-def most_depth(
-    prepared: PreparedScene, medium: records.Medium, box: tuple[np.ndarray, np.ndarray]
-) -> np.ndarray:
-    """Bound of the optical depth across the medium's world box, float64 (3,); inf where it has no end."""
-    extinction = peak_extinction(prepared, medium)
+def most_depth(extinction: np.ndarray, box: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """Bound of the optical depth across a medium's world box, float64 (3,); inf where it has no end.
+
+    `extinction`: its largest sigma_t.
+    """
     length = np.linalg.norm(box[1] - box[0])
-    return np.multiply(extinction, length, where=extinction > 0, out=np.zeros(3))
+    depth: np.ndarray = np.multiply(extinction, length, where=extinction > 0, out=np.zeros(3))
+    return depth
 
 
 def expected_albedo(medium: records.Medium) -> np.ndarray:
@@ -153,10 +158,10 @@ def expected_albedo(medium: records.Medium) -> np.ndarray:
     return np.sqrt((1 - s) * (1 - 0.139 * s) / (1 + 1.17 * s))
 
 
-def _emission(record: np.void, medium: records.Medium, volumes: dict[int, int]) -> None:
+def _emission(record: np.void, medium: records.Medium, roles: dict[str, int]) -> None:
     """What a medium emits; constants are multiplied together here."""
-    record["emission_volume"] = volumes.get(id(medium.emission), -1)
-    record["temperature_volume"] = volumes.get(id(medium.temperature), -1)
+    record["emission_volume"] = roles.get("emission", -1)
+    record["temperature_volume"] = roles.get("temperature", -1)
     if not medium.emits:
         return
     radiance = _rgb(medium.emission_scale)

@@ -152,7 +152,7 @@ def device_values(device, volume, points):
     probe = Probe(device, scene_of(medium))
     out = np.empty(len(points), np.float32)
     body = "out0[i] = volume_value(scene, scene->volumes, vload3(i, in0), 0);"
-    origin = np.array(next(iter(probe.prepared.volumes.values())).bricks.origin)
+    origin = np.array(probe.prepared.volumes[0].bricks.origin)
     probe.run(["density/volume.h"], body, [out], [(points - origin).astype(np.float32)])
     return out
 

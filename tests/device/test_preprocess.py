@@ -9,8 +9,10 @@ from clvol import layout
 from clvol.device import programs
 from clvol.device.preprocess import Preprocessor
 from clvol.planning import registry
-from clvol.planning.config import KernelConfig
+from clvol.planning.choices import Choices
 from clvol.planning.features import Features
+from clvol.planning.plan import Plan
+from clvol.planning.settled import Settled
 
 CL = Path(__file__).resolve().parents[2] / "cl"
 HEADERS = sorted(str(p.relative_to(CL)) for p in CL.rglob("*.h"))
@@ -83,22 +85,28 @@ def test_lines_are_numbered_as_in_their_files():
 
 
 def everything(**features):
-    """A configuration for which no file is empty, with light that is gathered on walks."""
+    """A plan for which no file is empty, with light that is gathered on walks."""
     found = {name: True for name, kind in Features.__annotations__.items() if kind == "bool"}
     found |= {"media": 2, "volumes": 1, "surfaces": 1, "emitters": 1, "boundaries": 1}
     found |= {"bsdfs": layout.BSDFS, "phases": layout.ENUMS["PHASE"]}
     found["media_overlap"] = False
-    choices = {"technique": "decomposition", "transmittance": "residual-ratio", "sampler": "sobol"}
-    return KernelConfig(Features(**found | features), **choices, aov=tuple(registry.AOVS), top_trees=True)
+    choices = Choices(
+        technique="decomposition",
+        transmittance="residual-ratio",
+        absorption="sample",
+        sampler="sobol",
+        aov=tuple(registry.AOVS),
+    )
+    return Plan.for_features(Features(**found | features), choices).settle(Settled("grid", top_trees=True))
 
 
 @pytest.mark.parametrize("folder", sorted({name.split("/")[0] for name in HEADERS}))
 def test_every_header_includes_what_it_uses(device, folder):
     """Each compiles by itself."""
-    config = everything()
+    plan = everything()
     for name in HEADERS:
         if name.startswith(f"{folder}/"):
-            unit = programs.compose(config, f'#include "{name}"\n__kernel void nothing(void) {{}}\n')
+            unit = programs.compose(plan, f'#include "{name}"\n__kernel void nothing(void) {{}}\n')
             assert f'"{name}"' in unit, f"{name} is empty"
             programs.build(device, unit, name)
 

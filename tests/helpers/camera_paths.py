@@ -30,7 +30,7 @@ def start_paths(device, scene, samples):
     record["last_pass"], record["last_samples"] = 0, samples
     flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
     probe.buffers["render"] = cl.Buffer(device.context, flags, hostbuf=record)
-    fields = layout.path_fields(probe.config.macros)
+    fields = layout.path_fields(probe.plan.macros)
     pixel, state = np.zeros(jobs, np.uint32), np.zeros((len(fields), jobs), np.uint32)
     body = """
         Scene with_state = *scene;

@@ -8,8 +8,6 @@ from pictures import box, gridded, picture, volume
 from clvol.lab import pilot as pilots
 from clvol.lab.candidates import Candidate
 from clvol.lab.seeds import independent_seeds
-from clvol.planning.choices import resolve
-from clvol.planning.config import KernelConfig
 from clvol.scene.records import ConstantEmitter, DirectionalEmitter
 
 CUBE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
@@ -52,11 +50,11 @@ class MadeUpPilot(pilots.Pilot):
         return super()._confirmed(best, auto)
 
     def _open(self, choices):
-        resolved = resolve(self.features, choices.names)
-        majorant = "grid" if choices.majorant == "auto" else choices.majorant
-        config = KernelConfig(self.features, **{**resolved, "majorant": majorant})
-        used = {family: getattr(config, family) for family in pilots.CHOSEN}
-        session = SimpleNamespace(config=config, choices=lambda: used)
+        plan = self.plan.having(choices)
+        if plan.chosen["majorant"] == "auto":
+            plan = plan.renamed(majorant="grid")
+        used = {family: plan.chosen[family] for family in pilots.CHOSEN}
+        session = SimpleNamespace(plan=plan)
         trial = SimpleNamespace(session=session, choices=choices, names=used, precompute_seconds=0.0)
         candidate = Candidate(" + ".join(used.values()), trial)
         efficiency = np.prod([self.factors[f].get(n, 1.0) for f, n in used.items()])

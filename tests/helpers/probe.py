@@ -5,9 +5,9 @@ import pyopencl as cl
 
 from clvol import layout
 from clvol.device import programs
-from clvol.planning.choices import Choices, prepare_for
-from clvol.planning.config import KernelConfig
-from clvol.rendering.session import kernel_config, render_record
+from clvol.planning.choices import Choices
+from clvol.planning.plan import Plan
+from clvol.rendering.session import on_device, render_record
 from clvol.rendering.upload import upload_scene
 from clvol.scene.records import (
     ConstantEmitter,
@@ -21,6 +21,7 @@ from clvol.scene.records import (
     Scene,
     Shape,
 )
+from clvol.tables.prepare import prepare
 from clvol.volumes.grid import DenseGrid
 
 UNIT_BOX = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
@@ -72,15 +73,15 @@ class Probe:
 
     def __init__(self, device, scene, **choices):
         self.device = device
-        self.choices = Choices(**({"majorant": "grid"} | choices))
-        self.prepared = prepare_for(scene, self.choices)
-        self.config: KernelConfig = kernel_config(self.prepared, self.choices, device)
+        plan = Plan.of(scene, Choices(**({"majorant": "grid"} | choices)))
+        self.prepared = on_device(prepare(scene, plan), device)
+        self.plan = self.prepared.plan
         self.upload()
 
     def upload(self, seed=1):
         """Write the prepared scene to the device (again)."""
         device = self.device
-        self.buffers = upload_scene(device, self.prepared, self.config, self.choices.step)
+        self.buffers = upload_scene(device, self.prepared)
         self.buffers["render"] = cl.Buffer(
             device.context,
             cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR,
@@ -98,7 +99,7 @@ class Probe:
         c_types = {"f": "float", "u": "uint", "i": "int"}
         extra = "".join(f", __global {c_types[a.dtype.kind]} *{name}" for name, a in names)
         source = programs.compose(
-            self.config,
+            self.plan,
             "".join(
                 f'#include "{name}"\n' if name.endswith(".h") else f"#include {name}\n" for name in headers
             )
@@ -114,7 +115,7 @@ class Probe:
         dummy = cl.Buffer(self.device.context, cl.mem_flags.READ_WRITE, 4)
         scene = [
             np.uint32(1) if a.name == "slot_stride" else self.buffers.get(a.name, dummy)
-            for a in layout.arguments(self.config.macros)
+            for a in layout.arguments(self.plan.macros)
         ]
         count = outputs[0].shape[0]
         kernel(self.device.queue, (-(-count // 64) * 64,), (64,), *scene, *arrays, np.uint32(count))

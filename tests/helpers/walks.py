@@ -90,10 +90,10 @@ def exact_depth(field, ray):
     )
 
 
-def headers_of(config, family):
+def headers_of(plan, family):
     """What a kernel round one tracker includes."""
     analytic = {"technique": "homogeneous", "transmittance": "homogeneous_transmittance"}[family]
-    chosen = [f"CLVOL_{family.upper()}_HEADER"] if config.features.heterogeneous else []
+    chosen = [f"CLVOL_{family.upper()}_HEADER"] if plan.features.heterogeneous else []
     return [*chosen, f"tracking/{analytic}.h", "stages/medium_ray.h"]
 
 
@@ -105,7 +105,7 @@ def record_of(probe, ray, length, channel=0):
 
 def sample_walks(probe, ray, length, walks, seed=1, channel=0):
     """(t or -1, weights (walks, spectrum), emission (walks, spectrum), flaws, look-ups) of many walks."""
-    n, u = probe.config.spectrum, np.uint32
+    n, u = probe.plan.spectrum, np.uint32
     out = (
         np.empty(walks, np.float32),
         np.empty((walks, n), np.float32),
@@ -115,7 +115,7 @@ def sample_walks(probe, ray, length, walks, seed=1, channel=0):
     )
     record = record_of(probe, ray, length, channel)
     t, weights, flaws, lookups, emission = probe.run(
-        headers_of(probe.config, "technique"), COLLISION_BODY % seed, out, [record]
+        headers_of(probe.plan, "technique"), COLLISION_BODY % seed, out, [record]
     )
     return t, weights, emission, flaws, lookups
 
@@ -123,12 +123,12 @@ def sample_walks(probe, ray, length, walks, seed=1, channel=0):
 def transmittance_walks(probe, ray, length, walks, seed=1, channel=0):
     """(estimates (walks, extinction), flaws, look-ups) of many shadow rays."""
     out = (
-        np.empty((walks, probe.config.extinction), np.float32),
+        np.empty((walks, probe.plan.extinction), np.float32),
         np.empty(walks, np.uint32),
         np.empty(walks, np.uint32),
     )
     record = record_of(probe, ray, length, channel)
-    return probe.run(headers_of(probe.config, "transmittance"), TRANSMITTANCE_BODY % seed, out, [record])
+    return probe.run(headers_of(probe.plan, "transmittance"), TRANSMITTANCE_BODY % seed, out, [record])
 
 
 def bin_edges(tau, length):

@@ -237,7 +237,7 @@ def test_lobes_are_merged_and_sorted_and_those_of_no_weight_left_out():
 
 
 def test_loops_are_compiled_for_mixtures_only(device):
-    blended = {name: phase_probe(device, phase).config.macros for name, phase in MIXTURES.items()}
+    blended = {name: phase_probe(device, phase).plan.macros for name, phase in MIXTURES.items()}
     with_loop = {name for name, defines in blended.items() if defines["CLVOL_HAS_BLEND"]}
     assert with_loop == {"two of a kind", "two kinds", "nested", "a rare one"}
     with_rayleigh = {name for name, defines in blended.items() if defines["CLVOL_HAS_RAYLEIGH"]}

@@ -91,7 +91,7 @@ def test_collisions_of_each_channel_follow_its_distribution(probes, technique, m
         probe = probes(field, **choices_of("technique", technique, majorant, lookup))
         ray, length = RAYS[name], exit_distance(*RAYS[name])
         tau = exact_depth(field, name)
-        together = probe.config.spectrum == 3
+        together = probe.plan.spectrum == 3
         assert together == registry.TECHNIQUES[technique].all_channels
         walks = None
         for channel in range(3):

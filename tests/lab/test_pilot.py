@@ -39,11 +39,11 @@ def test_both_kinds_of_seconds_are_of_the_same_clock(monkeypatch):
         now["perf_counter"] += own + waiting
 
     class Session(SimpleNamespace):
-        setup_seconds, kernel_seconds, config = 4.0, 3.0, SimpleNamespace()
+        setup_seconds, kernel_seconds = 4.0, 3.0
+        plan = SimpleNamespace(in_force=dict.fromkeys(pilots.CHOSEN, "x"))
         image, stats = np.zeros((2, 2, 3)), {"largest_weight": 1.0}
         restart = lambda self, *_: self  # noqa: E731
         run = lambda *_: work(6.0, 50.0)  # noqa: E731
-        choices = lambda _: dict.fromkeys(pilots.CHOSEN, "x")  # noqa: E731
 
         @classmethod
         def open(cls, device, *_):
@@ -52,12 +52,12 @@ def test_both_kinds_of_seconds_are_of_the_same_clock(monkeypatch):
 
     monkeypatch.setattr(pilots, "Session", Session)
     monkeypatch.setattr(candidates, "make_result", lambda session, *_: session)
-    monkeypatch.setattr(pilots, "prepare_for", lambda *_: work(3.0, 70.0))
+    prepared = SimpleNamespace(under=lambda plan: None)
+    monkeypatch.setattr(pilots, "prepare", lambda *_: work(3.0, 70.0) or prepared)
     device = SimpleNamespace(is_cpu=True, info=SimpleNamespace(compute_units=2))
     run = pilots.Pilot(
         device, scene(lumps(), (SKY,)), Choices(), independent_seeds(0, "pilot"), 4, None, None
     )
-    run.small = run.scene
     candidate = run._open(run.choices)
     candidate.render(1, 4)
     assert candidate.seconds == [3.0]  # two threads

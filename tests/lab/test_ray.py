@@ -242,11 +242,11 @@ def test_a_walk_is_the_same_unwatched(device):
     out1[i] = collision.beta;
     """
     out = np.empty(500, np.float32), np.empty(500, np.float32)
-    t, weights = probe.run(headers_of(probe.config, "technique"), body, out, [np.array(given, np.float32)])
+    t, weights = probe.run(headers_of(probe.plan, "technique"), body, out, [np.array(given, np.float32)])
     np.testing.assert_array_equal(t, watched.watched[0].outcomes[:, 0])
     np.testing.assert_array_equal(weights, watched.watched[0].outcomes[:, 1])
-    for stage in probe.config.stages:
-        assert "Recorder" not in programs.stage_source(probe.config, stage)
+    for stage in probe.plan.stages:
+        assert "Recorder" not in programs.stage_source(probe.plan, stage)
 
 
 def test_a_log_too_short_for_a_walk_says_so():

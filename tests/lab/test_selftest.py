@@ -24,7 +24,7 @@ from clvol.lab.reduced import reduced
 from clvol.lab.seeds import independent_seeds
 from clvol.lab.selftest import SelfTest
 from clvol.lab.trials import rounds
-from clvol.planning.features import Features
+from clvol.planning.plan import Plan
 from clvol.planning.registry import FAMILIES
 from clvol.scene.records import ConstantEmitter, DirectionalEmitter, Film
 
@@ -45,16 +45,16 @@ def lumps(scale=(3.0,)):
 
 @pytest.mark.parametrize("medium", [lumps(), lumps((3.0, 2.0, 1.0)), homogeneous(1.0, 0.5)])
 def test_every_choice_that_is_in_use_occurs(medium):
-    features = Features.from_scene(scene(medium))
-    all_of_them = set(usable(features))
+    plan = Plan.of(scene(medium))
+    all_of_them = set(usable(plan))
     first = dict(zip(KEYS, next(iter(all_of_them)), strict=True))
-    found = covering(features, first)
-    had = [first, *(in_force(features, names) for names in found.combinations)]
+    found = covering(plan, first)
+    had = [first, *(in_force(plan, names) for names in found.combinations)]
     for n, key in enumerate(KEYS):
         assert {one[key] for one in had} == {row[n] for row in all_of_them}
     for names in found.combinations:
         assert all(name in unbiased(family) for family, name in names.items())
-    more = covering(features, first, most=len(found.combinations) + 5)
+    more = covering(plan, first, most=len(found.combinations) + 5)
     assert len(more.combinations) <= len(found.combinations) + 5 and more.pairs >= found.pairs
     assert len(all_of_them) > len(had) or medium.homogeneous
 

@@ -16,9 +16,11 @@ from clvol.device import programs
 from clvol.errors import DeviceError
 from clvol.layout.path_text import path_values
 from clvol.layout.stages import EVENTS, IDLE, QUEUES, STAGES
-from clvol.planning.choices import Choices, prepare_for
+from clvol.planning.choices import Choices
+from clvol.planning.plan import Plan
 from clvol.rendering import wavefront
-from clvol.rendering.session import Session, kernel_config
+from clvol.rendering.session import Session, on_device
+from clvol.tables.prepare import prepare
 
 NAMES = [stage.name for stage in STAGES]
 EMPTIED_BY = {stage.empties: stage for stage in STAGES}
@@ -153,10 +155,11 @@ CASES = {
 }
 
 
-def config_of(device, name):
+def plan_of(device, name):
     described, choices = CASES[name]
-    chosen = Choices(majorant="grid", **choices)
-    return kernel_config(prepare_for(described(), chosen), chosen, device)
+    made = described()
+    prepared = prepare(made, Plan.of(made, Choices(majorant="grid", **choices)))
+    return on_device(prepared, device).plan
 
 
 def functions(source):
@@ -193,11 +196,11 @@ def test_a_stage_does_all_that_its_contract_says(device, stage):
     values = {declared.name for declared in layout.PATH_STATE}
     reads, writes, pushes, events = set(), set(), set(), set()
     for name in CASES:
-        config = config_of(device, name)
-        if stage.name not in config.stages:
+        plan = plan_of(device, name)
+        if stage.name not in plan.stages:
             continue
-        words, bodies = named(programs.stage_source(config, stage.name), stage)
-        kept = {n for n, value in path_values(config.macros).items() if value.rows}
+        words, bodies = named(programs.stage_source(plan, stage.name), stage)
+        kept = {n for n, value in path_values(plan.macros).items() if value.rows}
         reads |= {v for v in values & kept if f"path_{v}" in words}
         writes |= {v for v in values & kept if f"set_path_{v}" in words}
         pushes |= words & TRANSITIONS
@@ -214,9 +217,9 @@ def test_a_stage_does_all_that_its_contract_says(device, stage):
 
 def test_paths_are_moved_by_transitions_alone(device):
     for name in CASES:
-        config = config_of(device, name)
-        for stage in (s for s in STAGES if s.name in config.stages):
-            bodies = functions(programs.stage_source(config, stage.name))
+        plan = plan_of(device, name)
+        for stage in (s for s in STAGES if s.name in plan.stages):
+            bodies = functions(programs.stage_source(plan, stage.name))
             pushing = {name for name, body in bodies.items() if "queue_push(" in body}
             assert pushing == {t.function for t in stage.transitions if t.to != IDLE}
             assert not [n for n in bodies if n in {f"set_path_{value}" for value in stage.sets}]
@@ -233,7 +236,7 @@ def test_paths_are_moved_by_transitions_alone(device):
     ],
 )
 def test_what_a_contract_does_not_name_does_not_compile(device, monkeypatch, stage, old, new):
-    config = config_of(device, "a medium, a channel a path")
+    plan = plan_of(device, "a medium, a channel a path")
     original = programs.kernel_source
 
     def source(name):
@@ -243,10 +246,10 @@ def test_what_a_contract_does_not_name_does_not_compile(device, monkeypatch, sta
         assert old in text
         return text.replace(old, new)
 
-    programs.build(device, programs.stage_source(config, stage), stage)
+    programs.build(device, programs.stage_source(plan, stage), stage)
     monkeypatch.setattr(programs, "kernel_source", source)
     with pytest.raises(DeviceError, match="does not build"):
-        programs.build(device, programs.stage_source(config, stage), stage)
+        programs.build(device, programs.stage_source(plan, stage), stage)
 
 
 # -- contracts against what happens ----------------------------------------------------------------------
@@ -257,9 +260,7 @@ def test_a_launch_moves_paths_and_writes_values_as_its_contract_says(device, mon
     described, choices = CASES[name]
     session = Session.for_scene(device, described(), Choices(majorant="grid", **choices), 0, pool=256)
     waves, launch = session.wavefront, cl.enqueue_nd_range_kernel
-    value_of = [
-        declared.name for declared in layout.PATH_STATE for _ in declared.fields(session.config.macros)
-    ]
+    value_of = [declared.name for declared in layout.PATH_STATE for _ in declared.fields(session.plan.macros)]
     moved, written = {stage: set() for stage in NAMES}, {stage: set() for stage in NAMES}
 
     def read(buffer, shape):
@@ -288,4 +289,4 @@ def test_a_launch_moves_paths_and_writes_values_as_its_contract_says(device, mon
     for stage in STAGES:
         assert moved[stage.name] <= {t.to for t in stage.transitions}
         assert written[stage.name] <= stage.writes | stage.sets
-        assert stage.name not in session.config.stages or moved[stage.name]
+        assert stage.name not in session.plan.stages or moved[stage.name]

@@ -11,15 +11,13 @@ from stat_tests import assert_same_picture
 import clvol
 from clvol import render
 from clvol.errors import OptionError
-from clvol.planning import registry
-from clvol.planning.choices import Choices, resolve
-from clvol.planning.features import Features
+from clvol.planning.choices import Choices
+from clvol.planning.plan import Plan
 from clvol.scene.records import ConstantEmitter, ConstVolume, DirectionalEmitter
 
 CUBE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 LUMPS = np.random.default_rng(1).random((5, 6, 7))
 SKY, SUN = ConstantEmitter(), DirectionalEmitter((2.0,), (0.0, -1.0, 0.0))
-AUTO = dict.fromkeys(registry.FAMILIES, "auto")
 
 
 def scene(scale=(3.0,), lights=(SKY, SUN), more=(), filter_type="trilinear"):
@@ -41,7 +39,7 @@ OVERLAPPING = scene(more=[box((0.5, 0, 0), (1.5, 1, 1), homogeneous(1.0, 0.5))])
     ids=["grey", "under a sky", "chromatic", "overlapping"],
 )
 def test_auto_follows_the_rules_that_are_written_down(described, technique, transmittance):
-    found = resolve(Features.from_scene(described), AUTO)
+    found = Plan.of(described).chosen
     assert (found["technique"], found["transmittance"]) == (technique, transmittance)
     others = {name: found[name] for name in ("lookup", "absorption", "probability", "control")}
     assert others == {"lookup": "exact", "absorption": "mixed", "probability": "history", "control": "mean"}
@@ -70,7 +68,7 @@ def glowing(albedo=0.5, scale=(3.0,), more=()):
 def test_auto_takes_exact_flights_where_low_discrepancy_samples_meet_dark_media_that_glow(
     described, asked, technique
 ):
-    found = resolve(Features.from_scene(described), AUTO | {"sampler": "sobol"} | asked)
+    found = Plan.of(described, Choices(**{"sampler": "sobol"} | asked)).chosen
     assert found["technique"] == technique
 
 

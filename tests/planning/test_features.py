@@ -16,8 +16,9 @@ from probe import Probe, medium_of, scene_of
 import clvol
 from clvol import layout
 from clvol.device import programs
-from clvol.planning.choices import Choices, prepare_for
-from clvol.rendering.session import kernel_config
+from clvol.planning.choices import Choices
+from clvol.planning.plan import Plan
+from clvol.rendering.session import on_device
 from clvol.scene.materials import Conductor, Dielectric, Diffuse, Mask
 from clvol.scene.records import (
     ConstantEmitter,
@@ -27,6 +28,7 @@ from clvol.scene.records import (
     PointEmitter,
     ReconstructionFilter,
 )
+from clvol.tables.prepare import prepare
 
 CUBE = (0, 0, 0), (1, 1, 1)
 SKY, SUN, LAMP = ConstantEmitter(), DirectionalEmitter((1.0,), (0, -1, 0)), PointEmitter((1.0,), (0, 3, 0))
@@ -68,30 +70,30 @@ SCENES = {
 }
 
 
-def config_of(device, described, majorant="grid", **choices):
-    chosen = Choices(majorant=majorant, **choices)
-    return kernel_config(prepare_for(described, chosen), chosen, device)
+def plan_of(device, described, majorant="grid", **choices):
+    plan = Plan.of(described, Choices(majorant=majorant, **choices))
+    return on_device(prepare(described, plan), device).plan
 
 
-def units(config):
+def units(plan):
     """Composed text of every stage, without comments."""
     return {
-        stage: re.sub(r"/\*.*?\*/", "", programs.stage_source(config, stage), flags=re.DOTALL)
-        for stage in (*config.stages, "accumulate")
+        stage: re.sub(r"/\*.*?\*/", "", programs.stage_source(plan, stage), flags=re.DOTALL)
+        for stage in (*plan.stages, "accumulate")
     }
 
 
-def headers(config):
+def headers(plan):
     """Files under cl/ that any unit holds."""
-    return {name for text in units(config).values() for name in re.findall(r'^#line \d+ "(.+)"$', text, re.M)}
+    return {name for text in units(plan).values() for name in re.findall(r'^#line \d+ "(.+)"$', text, re.M)}
 
 
-def argument_names(config):
-    return {a.name for a in layout.arguments(config.macros)}
+def argument_names(plan):
+    return {a.name for a in layout.arguments(plan.macros)}
 
 
-def field_names(config):
-    return {f.name for f in layout.path_fields(config.macros)}
+def field_names(plan):
+    return {f.name for f in layout.path_fields(plan.macros)}
 
 
 # -- stages ------------------------------------------------------------------------------------------
@@ -109,7 +111,7 @@ def field_names(config):
     }.items(),
 )
 def test_only_the_stages_a_scene_needs_are_composed(device, name, stages):
-    assert config_of(device, SCENES[name]).stages == tuple(stages.split())
+    assert plan_of(device, SCENES[name]).stages == tuple(stages.split())
 
 
 def test_a_scene_without_media_launches_no_medium_stage():
@@ -132,15 +134,15 @@ def test_a_scene_without_light_is_black():
 
 
 def test_absorbing_media_need_no_shadow_rays_whatever_is_asked_for(device):
-    config = config_of(device, scene([fog(albedo=0.0)], [SUN]), transmittance="ratio")
-    assert not config.nee
-    assert "phase/phase.h" not in headers(config)
+    plan = plan_of(device, scene([fog(albedo=0.0)], [SUN]), transmittance="ratio")
+    assert not plan.nee
+    assert "phase/phase.h" not in headers(plan)
 
 
 def test_media_that_do_not_sample_emitters_need_no_shadow_rays(device):
     medium = medium_of(1.0, albedo=0.5, sample_emitters=False)
-    config = config_of(device, scene([box(*CUBE, medium)], [SUN]), transmittance="ratio")
-    assert "shadow_transmittance" not in config.stages
+    plan = plan_of(device, scene([box(*CUBE, medium)], [SUN]), transmittance="ratio")
+    assert "shadow_transmittance" not in plan.stages
 
 
 # -- homogeneous and heterogeneous ---------------------------------------------------------------------
@@ -151,15 +153,15 @@ GRID_WORDS = ("majorant", "volume", "brick", "lookups", "tops", "kd_nodes", "wor
 
 @pytest.mark.parametrize("name", ["nothing", "a sky", "absorbing fog", "fog under a sun", "coloured fog"])
 def test_homogeneous_scenes_hold_no_grid_code_and_no_grid_buffers(device, name):
-    config = config_of(device, SCENES[name])
-    assert config.majorant == "none"
-    files = headers(config)
+    plan = plan_of(device, SCENES[name])
+    assert plan.chosen["majorant"] == "none"
+    files = headers(plan)
     assert not [
         f for f in files if f.startswith(("density/", "majorant/", "tracking/delta", "tracking/ratio"))
     ]
-    assert not argument_names(config) & {"volumes", "tops", "bricks", "majorants", "kd_nodes"}
-    assert not field_names(config) & {"lookups", "violations", "exhausted"}
-    for stage, text in units(config).items():
+    assert not argument_names(plan) & {"volumes", "tops", "bricks", "majorants", "kd_nodes"}
+    assert not field_names(plan) & {"lookups", "violations", "exhausted"}
+    for stage, text in units(plan).items():
         for word in (
             "majorant_next",
             "volume_value",
@@ -171,53 +173,53 @@ def test_homogeneous_scenes_hold_no_grid_code_and_no_grid_buffers(device, name):
 
 
 def test_grids_hold_no_analytic_tracking(device):
-    assert "tracking/homogeneous.h" not in headers(config_of(device, SCENES["a grid"]))
-    assert "tracking/homogeneous.h" in headers(config_of(device, SCENES["everything"]))
+    assert "tracking/homogeneous.h" not in headers(plan_of(device, SCENES["a grid"]))
+    assert "tracking/homogeneous.h" in headers(plan_of(device, SCENES["everything"]))
 
 
 @pytest.mark.parametrize(
     "majorant, buffer", {"global": "", "grid": "majorants", "kdtree": "kd_nodes"}.items()
 )
 def test_one_majorant_is_compiled_and_only_its_buffer_is_bound(device, majorant, buffer):
-    config = config_of(device, SCENES["a grid"], majorant)
-    walks = {f for f in headers(config) if f.startswith("majorant/")} - {"majorant/majorant.h"}
+    plan = plan_of(device, SCENES["a grid"], majorant)
+    walks = {f for f in headers(plan) if f.startswith("majorant/")} - {"majorant/majorant.h"}
     assert walks == {f"majorant/{majorant}.h"} | ({"majorant/box_walk.h"} if majorant == "kdtree" else set())
-    assert not {"geometry/lattice_tree.h", "majorant/tree_grid.h"} & set(headers(config)), "for sparse grids"
-    assert argument_names(config) & {"majorants", "kd_nodes"} == ({buffer} if buffer else set())
+    assert not {"geometry/lattice_tree.h", "majorant/tree_grid.h"} & set(headers(plan)), "for sparse grids"
+    assert argument_names(plan) & {"majorants", "kd_nodes"} == ({buffer} if buffer else set())
 
 
 # -- light -------------------------------------------------------------------------------------------
 
 
 def test_environment_map_code_comes_with_an_environment_map(device):
-    with_map = config_of(device, scene([fog()], [ENVMAP]))
-    without = config_of(device, scene([fog()], [SKY, SUN]))
+    with_map = plan_of(device, scene([fog()], [ENVMAP]))
+    without = plan_of(device, scene([fog()], [SKY, SUN]))
     assert "emitter/envmap.h" in headers(with_map) and "env_texels" in argument_names(with_map)
     assert "emitter/envmap.h" not in headers(without)
     assert not argument_names(without) & {"envmap", "env_texels", "env_marginal", "env_conditional"}
 
 
 def test_the_pdf_of_a_direction_is_kept_only_for_multiple_importance_sampling(device):
-    assert "pdf" in field_names(config_of(device, scene([fog()], [ENVMAP])))
-    assert "pdf" not in field_names(config_of(device, SCENES["fog under a sun"]))
-    assert "pdf" not in field_names(config_of(device, SCENES["fog under a sky"]))
+    assert "pdf" in field_names(plan_of(device, scene([fog()], [ENVMAP])))
+    assert "pdf" not in field_names(plan_of(device, SCENES["fog under a sun"]))
+    assert "pdf" not in field_names(plan_of(device, SCENES["fog under a sky"]))
 
 
 def test_the_distance_to_a_light_is_kept_only_for_point_lights(device):
-    assert "shadow_distance" in field_names(config_of(device, scene([fog()], [LAMP])))
-    assert "shadow_distance" not in field_names(config_of(device, SCENES["fog under a sun"]))
+    assert "shadow_distance" in field_names(plan_of(device, scene([fog()], [LAMP])))
+    assert "shadow_distance" not in field_names(plan_of(device, SCENES["fog under a sun"]))
 
 
 # -- channels, media, film -----------------------------------------------------------------------------
 
 
-def bytes_per_slot(config):
-    return 4 * len(layout.path_fields(config.macros))
+def bytes_per_slot(plan):
+    return 4 * len(layout.path_fields(plan.macros))
 
 
 def test_grey_scenes_carry_one_channel_and_smaller_paths(device):
-    grey = config_of(device, scene([fog()], [SUN]))
-    coloured_light = config_of(device, scene([fog()], [DirectionalEmitter((1, 0.5, 0.2), (0, -1, 0))]))
+    grey = plan_of(device, scene([fog()], [SUN]))
+    coloured_light = plan_of(device, scene([fog()], [DirectionalEmitter((1, 0.5, 0.2), (0, -1, 0))]))
     assert (grey.channels, coloured_light.channels) == (1, 3)
     assert "#define CLVOL_CHANNELS 1\n" in programs.stage_source(grey, "accumulate")
     assert "#define CLVOL_CHANNELS 3\n" in programs.stage_source(coloured_light, "accumulate")
@@ -229,44 +231,44 @@ COLOURED_GRID = box(*CUBE, gridded(volume(LUMPS[..., None] * [1, 0.5, 0.2], *CUB
 
 
 def test_one_channel_per_path_costs_one_field(device):
-    grey = config_of(device, scene([grid()], [SUN]), technique="delta")
-    chromatic = config_of(device, scene([COLOURED_GRID], [SUN]), technique="delta")
+    grey = plan_of(device, scene([grid()], [SUN]), technique="delta")
+    chromatic = plan_of(device, scene([COLOURED_GRID], [SUN]), technique="delta")
     assert (chromatic.channels, chromatic.spectrum, chromatic.extinction) == (3, 1, 1)
     assert field_names(chromatic) - field_names(grey) == {"channel"}
 
 
 @pytest.mark.parametrize("technique", ["spectral", "spectral-decomposition", "regular"])
 def test_techniques_that_follow_all_channels_carry_them(device, technique):
-    config = config_of(device, scene([COLOURED_GRID], [SUN]), technique=technique)
-    assert (config.channels, config.spectrum, config.extinction) == (3, 3, 3)
-    assert config.weighted
+    plan = plan_of(device, scene([COLOURED_GRID], [SUN]), technique=technique)
+    assert (plan.channels, plan.spectrum, plan.extinction) == (3, 3, 3)
+    assert plan.weighted
 
 
 def test_homogeneous_media_of_several_colours_follow_all_channels(device):
-    config = config_of(device, scene([fog((0.5, 1.0, 1.5))], [SUN]))
-    assert (config.channels, config.spectrum, config.extinction) == (3, 3, 3)
+    plan = plan_of(device, scene([fog((0.5, 1.0, 1.5))], [SUN]))
+    assert (plan.channels, plan.spectrum, plan.extinction) == (3, 3, 3)
 
 
 def test_overlapping_media_of_several_colours_follow_all_channels(device):
-    config = config_of(device, scene([fog((0.5, 1.0, 1.5)), fog()], [SUN]))
-    assert (config.channels, config.spectrum, config.extinction) == (3, 3, 3)
+    plan = plan_of(device, scene([fog((0.5, 1.0, 1.5)), fog()], [SUN]))
+    assert (plan.channels, plan.spectrum, plan.extinction) == (3, 3, 3)
 
 
 def test_a_grey_medium_of_coloured_albedo_follows_all_channels_unless_absorption_is_sampled(device):
     described = scene([grid(albedo=(0.5, 0.9, 0.1))], [SUN])
     for absorption, spectrum in {"weight": 3, "mixed": 3, "sample": 1}.items():
-        config = config_of(device, described, absorption=absorption)
-        assert (config.spectrum, config.extinction) == (spectrum, 1)
-    assert config_of(device, described, absorption="sample", technique="spectral").spectrum == 3
+        plan = plan_of(device, described, absorption=absorption)
+        assert (plan.spectrum, plan.extinction) == (spectrum, 1)
+    assert plan_of(device, described, absorption="sample", technique="spectral").spectrum == 3
 
 
 def test_tables_of_cells_come_with_the_techniques_that_read_them(device):
     described = scene([grid()], [SUN])
-    plain = argument_names(config_of(device, described, technique="delta", transmittance="ratio"))
+    plain = argument_names(plan_of(device, described, technique="delta", transmittance="ratio"))
     assert not plain & {"controls", "residuals", "blackbody"}
-    decomposed = config_of(device, described, technique="decomposition", transmittance="residual-ratio")
+    decomposed = plan_of(device, described, technique="decomposition", transmittance="residual-ratio")
     assert argument_names(decomposed) - plain == {"controls", "residuals"}
-    marched = config_of(device, described, technique="marching", transmittance="marching")
+    marched = plan_of(device, described, technique="marching", transmittance="marching")
     assert plain - argument_names(marched) == {"majorants"}
     assert not any(name.startswith("majorant/") for name in headers(marched))
 
@@ -274,31 +276,31 @@ def test_tables_of_cells_come_with_the_techniques_that_read_them(device):
 def test_emission_code_comes_with_emission(device):
     described = scene([grid()], [SUN])
     glowing = replace(described.shapes[0].interior, emission=ConstVolume((1.0,)))
-    config = config_of(device, scene([box(*CUBE, glowing)], ()))
-    assert "medium/emission.h" in headers(config)
-    assert "medium/emission.h" not in headers(config_of(device, described))
+    plan = plan_of(device, scene([box(*CUBE, glowing)], ()))
+    assert "medium/emission.h" in headers(plan)
+    assert "medium/emission.h" not in headers(plan_of(device, described))
 
 
 def test_fields_for_several_media_come_with_several_media(device):
     one, apart = [fog()], [fog(), box((2, 0, 0), (3, 1, 1), homogeneous(1.0, 0.5))]
-    fields = [field_names(config_of(device, scene(shapes, [SUN]))) for shapes in (one, apart)]
+    fields = [field_names(plan_of(device, scene(shapes, [SUN]))) for shapes in (one, apart)]
     assert fields[1] ^ fields[0] == {"medium", "interval_end"}
 
 
 def test_the_filter_table_comes_with_a_filter_and_the_depth_count_with_a_limit(device):
     plain = scene([fog()])
-    config = config_of(device, plain)
-    assert "filter_cdf" not in argument_names(config)
-    assert not field_names(config) & {"cut", "cut_energy"}
+    plan = plan_of(device, plain)
+    assert "filter_cdf" not in argument_names(plan)
+    assert not field_names(plan) & {"cut", "cut_energy"}
     tent = scene_of(medium_of(1.0, albedo=0.5))
     object.__setattr__(tent.film, "rfilter", ReconstructionFilter("tent", 1.0))
-    assert "filter_cdf" in argument_names(config_of(device, tent))
-    assert {"cut", "cut_energy"} <= field_names(config_of(device, scene([fog()], max_depth=3)))
+    assert "filter_cdf" in argument_names(plan_of(device, tent))
+    assert {"cut", "cut_energy"} <= field_names(plan_of(device, scene([fog()], max_depth=3)))
 
 
-def test_what_render_reports_is_what_the_config_says(device):
+def test_what_render_reports_is_what_the_plan_says(device):
     result = clvol.render(SCENES["fog under a sky"], spp=16)
-    assert result.stats["bytes_per_slot"] == bytes_per_slot(config_of(device, SCENES["fog under a sky"]))
+    assert result.stats["bytes_per_slot"] == bytes_per_slot(plan_of(device, SCENES["fog under a sky"]))
 
 
 # -- surfaces ----------------------------------------------------------------------------------------
@@ -327,27 +329,27 @@ MEDIUM_CODE = (
 PLAIN = replace(ball((0.5, 0.5, 0.5), 0.4), bsdf=Diffuse())
 
 
-def held(config, words):
-    return {f for f in headers(config) if f.startswith(words)}
+def held(plan, words):
+    return {f for f in headers(plan) if f.startswith(words)}
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_scenes_without_surfaces_hold_no_geometry_code(device, name):
-    config = config_of(device, SCENES[name])
-    assert not held(config, (*SURFACE_CODE, "emitter/area", "stages/boundary"))
-    assert not [a for a in argument_names(config) if a.startswith(("bvh_", "shapes", "materials", "faces"))]
+    plan = plan_of(device, SCENES[name])
+    assert not held(plan, (*SURFACE_CODE, "emitter/area", "stages/boundary"))
+    assert not [a for a in argument_names(plan) if a.startswith(("bvh_", "shapes", "materials", "faces"))]
     assert not [
-        f for f in field_names(config) if f.startswith(("hit_primitive", "hit_t", "inside", "shadow_inside"))
+        f for f in field_names(plan) if f.startswith(("hit_primitive", "hit_t", "inside", "shadow_inside"))
     ]
 
 
 @pytest.mark.parametrize("lights", [[SKY], [LAMP], [SKY, LAMP], []], ids=["sky", "lamp", "both", "dark"])
 def test_scenes_without_media_hold_no_tracking_code(device, lights):
-    config = config_of(device, scene([PLAIN], lights))
-    assert held(config, MEDIUM_CODE) <= {"tracking/tally.h"}  # counters, all of them without a field
-    assert "medium_sample" not in config.stages
-    assert not argument_names(config) & {"media", "phases", "volumes", "bricks", "majorants"}
-    assert not field_names(config) & {
+    plan = plan_of(device, scene([PLAIN], lights))
+    assert held(plan, MEDIUM_CODE) <= {"tracking/tally.h"}  # counters, all of them without a field
+    assert "medium_sample" not in plan.stages
+    assert not argument_names(plan) & {"media", "phases", "volumes", "bricks", "majorants"}
+    assert not field_names(plan) & {
         "medium",
         "interval_end",
         "lookups",
@@ -355,7 +357,7 @@ def test_scenes_without_media_hold_no_tracking_code(device, lights):
         "real",
         "largest_weight",
     }
-    assert not argument_names(config) & {"result_counts"}
+    assert not argument_names(plan) & {"result_counts"}
 
 
 def test_what_shade_handles_comes_with_what_paths_can_meet(device):
@@ -365,7 +367,7 @@ def test_what_shade_handles_comes_with_what_paths_can_meet(device):
         "absorbing fog": {"escape", "collision_scatter"},
         "fog under a sun": {"bounce", "collision_scatter"},
     }.items():
-        found = held(config_of(device, SCENES[name]), ("stages/escape", "stages/bounce", "stages/collision"))
+        found = held(plan_of(device, SCENES[name]), ("stages/escape", "stages/bounce", "stages/collision"))
         assert found == {f"stages/{event}.h" for event in events}, name
 
 
@@ -378,13 +380,13 @@ def test_what_shade_handles_comes_with_what_paths_can_meet(device):
     ],
 )
 def test_only_the_bsdfs_of_a_scene_are_composed(device, bsdf, files):
-    config = config_of(device, scene([replace(PLAIN, bsdf=bsdf)], [SKY]))
-    assert held(config, "bsdf/") == {f"bsdf/{name}.h" for name in files | {"bsdf", "sample"}}
+    plan = plan_of(device, scene([replace(PLAIN, bsdf=bsdf)], [SKY]))
+    assert held(plan, "bsdf/") == {f"bsdf/{name}.h" for name in files | {"bsdf", "sample"}}
 
 
 def test_what_only_passable_or_transmissive_surfaces_need_comes_with_them(device):
     opaque, glass, veil = (
-        config_of(device, scene([replace(PLAIN, bsdf=b)], [SKY]))
+        plan_of(device, scene([replace(PLAIN, bsdf=b)], [SKY]))
         for b in (Diffuse(), Dielectric(), Mask(Diffuse()))
     )
     assert "eta_squared" in field_names(glass) and "eta_squared" not in field_names(opaque) | field_names(
@@ -396,7 +398,7 @@ def test_what_only_passable_or_transmissive_surfaces_need_comes_with_them(device
 def test_a_camera_looks_for_what_it_is_inside_of_only_where_it_may_be(device):
     for centre, inside in ((0.5, 0.5, 0.0), 0), ((0.5, 0.5, -2.0), 1):
         shape = replace(ball(centre, 0.4, homogeneous(1.0, 0.5)), bsdf=Dielectric())
-        assert config_of(device, scene([shape])).macros["CLVOL_CAMERA_INSIDE"] == inside
+        assert plan_of(device, scene([shape])).macros["CLVOL_CAMERA_INSIDE"] == inside
 
 
 # -- the device --------------------------------------------------------------------------------------
@@ -404,16 +406,16 @@ def test_a_camera_looks_for_what_it_is_inside_of_only_where_it_may_be(device):
 
 @pytest.mark.parametrize("name", ["nothing", "everything"])
 def test_composed_sources_of_every_stage_build(device, name):
-    config = config_of(device, SCENES[name])
-    kernels = programs.build_stages(device, config)
-    assert tuple(kernels) == (*config.stages, "accumulate")
+    plan = plan_of(device, SCENES[name])
+    kernels = programs.build_stages(device, plan)
+    assert tuple(kernels) == (*plan.stages, "accumulate")
     for stage, kernel in kernels.items():
         if stage != "accumulate":
-            assert kernel.num_args == len(layout.arguments(config.macros))
+            assert kernel.num_args == len(layout.arguments(plan.macros))
 
 
 def test_a_unit_is_self_contained_and_names_files_and_lines(device):
-    for text in units(config_of(device, SCENES["everything"])).values():
+    for text in units(plan_of(device, SCENES["everything"])).values():
         assert not re.search(r"^\s*#\s*include", text, re.M)
         assert '#line 1 "core/types.h"' in text
 

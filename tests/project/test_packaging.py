@@ -20,12 +20,16 @@ import site, sys
 site.addsitedir(sys.argv[1])  # as site-packages, so that .pth files count
 import clvol
 sys.path += sys.argv[2:]  # what clvol depends on, and perhaps another clvol
-from clvol.planning.config import KernelConfig
-from clvol.planning.features import Features
 from clvol.device.programs import stage_source
-config = KernelConfig(Features(media=1, volumes=1, heterogeneous=True, trilinear=True, scattering=True))
-for stage in config.stages:
-    assert f"{stage}_kernel" in stage_source(config, stage)
+from clvol.planning.plan import Plan
+from clvol.tables.prepare import prepare
+volume = {"type": "gridvolume", "data": [[[0.0, 1.0], [2.0, 3.0]], [[0.0, 1.0], [2.0, 3.0]]]}
+medium = {"type": "heterogeneous", "sigma_t": volume}
+cube = {"type": "cube", "interior": medium, "bsdf": {"type": "null"}}
+scene = clvol.load_dict({"type": "scene", "camera": {"type": "perspective"}, "cube": cube})
+plan = prepare(scene, Plan.of(scene)).plan
+for stage in plan.stages:
+    assert f"{stage}_kernel" in stage_source(plan, stage)
 print(clvol.__file__)
 """
 

@@ -63,9 +63,9 @@ def test_every_tool_says_what_it_does(
 
 @pytest.mark.parametrize("majorant", ["global", "grid", "kdtree"])
 def test_dump_writes_every_stage_as_a_self_contained_unit(tool, tmp_path: Path, majorant: str) -> None:
-    config = tool("scene_options").open_scene(CLOUD, {}, {"majorant": majorant}).config()
-    written = tool("dump_kernel").dump(config, tmp_path / "kernels")
-    assert [path.stem for path in written] == [*config.stages, "accumulate"]
+    plan = tool("scene_options").open_scene(CLOUD, {}, {"majorant": majorant}).plan
+    written = tool("dump_kernel").dump(plan, tmp_path / "kernels")
+    assert [path.stem for path in written] == [*plan.stages, "accumulate"]
     for path in written:
         text = path.read_text(encoding="utf-8")
         name = "accumulate_kernel" if path.stem == "accumulate" else "STAGE_KERNEL"

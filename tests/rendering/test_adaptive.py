@@ -210,7 +210,7 @@ def test_lists_of_pixels_give_the_bits_of_an_ordinary_render(device, case):
     scene, sampler, aovs, spp = CASES[case]
     ordinary = clvol.render(scene(), spp=spp, seed=5, sampler=sampler, aov=aovs)
     session = opened(device, scene(), sampler, aov=aovs)
-    assert (session.config.jobs_per_sample == 3) == ("channel" in case)
+    assert (session.plan.jobs_per_sample == 3) == ("channel" in case)
     listed = in_lists(session, 5, spp)
     assert (listed.aovs["samples"] == spp).all()
     for name in ("image", "variance"):
@@ -228,7 +228,7 @@ def test_passes_over_any_list_fit_into_the_ring(device, listed):
     wavefront = session.wavefront
     wavefront.list_pixels(np.arange(listed))
     jobs = wavefront.pass_samples * wavefront.sample_jobs * wavefront.pool.ring_passes
-    assert 4 * jobs * session.config.channels <= wavefront.buffers["results"].size
+    assert 4 * jobs * session.plan.channels <= wavefront.buffers["results"].size
 
 
 # -- what decides ------------------------------------------------------------------------------------

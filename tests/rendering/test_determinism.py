@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +18,8 @@ from signals import press_key
 from stat_tests import assert_same_picture
 
 import clvol
-from clvol.rendering import session
+from clvol.planning.plan import Plan
+from clvol.planning.settled import Tuning
 from clvol.scene.records import ConstantEmitter
 
 
@@ -53,10 +53,8 @@ def test_no_two_pixels_and_no_two_samples_share_their_random_numbers(whole):
 
 def test_the_launch_geometry_of_a_gpu_does_not_touch_a_bit(whole, monkeypatch):
     """Work-groups of 64 that share a queue, as on a GPU, where a CPU runs groups of one."""
-    chosen = session.kernel_config
-    monkeypatch.setattr(
-        session, "kernel_config", lambda *a: replace(chosen(*a), local_size=64, group_slots=512)
-    )
+    tune = Plan.tune
+    monkeypatch.setattr(Plan, "tune", lambda plan, _: tune(plan, Tuning(local_size=64, group_slots=512)))
     assert digest(rendered(scene(), spp=SPP, seed=7)) == digest(whole)
 
 
@@ -72,7 +70,8 @@ THREAD_SCRIPT = """
 import sys
 sys.path[:0] = sys.argv[1:]
 from every_bit import SPP, digest, rendered, scene
-from clvol.rendering import session
+from clvol.planning.plan import Plan
+from clvol.planning.settled import Tuning
 result = rendered(scene(), spp=SPP, seed=7)
 print(digest(result), result.metadata["device"], sep="|")
 """

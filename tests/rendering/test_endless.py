@@ -83,7 +83,7 @@ def levels(*changes):
 def test_the_host_is_asked_after_a_bounded_number_of_steps(device, kind):
     """No launch is longer than a stage's bound and a leg for each work-item, in both tracking stages."""
     session = session_of(device, kind)
-    runs, config = session.wavefront, session.config
+    runs, plan = session.wavefront, session.plan
     least = levels(8, 12)
     before, most = [0, 0], [0.0]
 
@@ -97,7 +97,7 @@ def test_the_host_is_asked_after_a_bounded_number_of_steps(device, kind):
 
     with contextlib.suppress(KeyboardInterrupt):  # raised where no pass was finished
         session.run(0, 1 << 20, None, None, ask)
-    items = runs.groups * config.local_size
+    items = runs.groups * plan.tuning.local_size
     assert 0 < most[0] <= 2 * items * (STAGE_STEPS + WALK_STEPS)
     assert least.calls[0] < 30
 

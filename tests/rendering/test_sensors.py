@@ -14,7 +14,7 @@ from sampling import uniform_p_value
 from stat_tests import FALSE_ALARM, largest_z
 
 import clvol
-from clvol.planning.features import Features
+from clvol.planning.plan import Plan
 from clvol.scene.describe import describe_scene
 from clvol.scene.records import Film, Perspective, ReconstructionFilter
 from clvol.tables.camera import camera_rays
@@ -111,9 +111,9 @@ def test_rays_fill_the_lens_evenly_and_meet_at_the_focus_distance(device):
 
 
 def test_a_pinhole_needs_no_lens():
-    assert Features.from_scene(scene_with(LENS, Film(6, 4, BOX))).lens
+    assert Plan.of(scene_with(LENS, Film(6, 4, BOX))).features.lens
     pinhole = replace(LENS, aperture_radius=0.0)
-    assert not Features.from_scene(scene_with(pinhole, Film(6, 4, BOX))).lens
+    assert not Plan.of(scene_with(pinhole, Film(6, 4, BOX))).features.lens
 
 
 # -- crop windows ----------------------------------------------------------------------------------
@@ -228,9 +228,9 @@ def test_weighted_samples_integrate_an_edge_as_quadrature_does(device, rfilter, 
 
 def test_positive_filters_carry_no_weight():
     gaussian = scene_with(Perspective(VIEW, 50.0), Film(6, 4))
-    assert not Features.from_scene(gaussian).signed_filter
+    assert not Plan.of(gaussian).features.signed_filter
     assert filter_cdf(ReconstructionFilter()).shape == (FILTER_BINS + 1,)
-    assert Features.from_scene(replace(gaussian, film=Film(6, 4, MITCHELL))).signed_filter
+    assert Plan.of(replace(gaussian, film=Film(6, 4, MITCHELL))).features.signed_filter
 
 
 def test_descriptions_tell_lens_crop_and_filter():

@@ -7,10 +7,11 @@ import pytest
 
 import clvol
 from clvol.errors import Error, SceneError
-from clvol.planning.features import Features, medium_volumes
+from clvol.planning.plan import Plan
 from clvol.scene import load_dict, load_file, scale
 from clvol.scene.describe import describe_scene
 from clvol.scene.digest import scene_digest
+from clvol.scene.medium_facts import medium_volumes
 from clvol.scene.phase import MAX_LOBES
 from clvol.scene.records import BlendPhase, ConstVolume, Film, GridVolume, Medium, Phase
 
@@ -34,7 +35,7 @@ def medium_of(**parameters):
 
 
 def features_of(**parameters):
-    return Features.from_scene(scene_of(**parameters))
+    return Plan.of(scene_of(**parameters)).features
 
 
 def error_of(**parameters):

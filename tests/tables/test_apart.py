@@ -9,8 +9,8 @@ from pictures import box, gridded, homogeneous, mean_and_error, picture, volume
 from stat_tests import largest_z
 
 import clvol
+from clvol.planning.settled import FAR_APART
 from clvol.scene.records import DirectionalEmitter
-from clvol.tables.apart import FAR_APART
 
 CUBE = (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0)
 ALBEDO, EDGE = 0.8, 2.0

@@ -12,7 +12,11 @@ from clvol.accel import choice, controls
 from clvol.accel.bounds import with_slack
 from clvol.accel.kdtree import build_kdtree, pack_maximum, unpack_maximum
 from clvol.errors import SceneError
-from clvol.tables.prepare import MajorantNeeds, prepare
+from clvol.planning.needs import MajorantNeeds
+from clvol.scene.medium_facts import number_matter
+from clvol.tables.majorants import choose_majorants
+from clvol.tables.prepare import prepare
+from clvol.tables.volumes import prepare_volume
 from clvol.volumes.bricks import BOUND_CELLS, BrickMap, build_bricks
 from clvol.volumes.grid import DenseGrid
 
@@ -26,10 +30,11 @@ MEDIUM_SCALE = 500.0
 
 
 def prepared(values, medium_scale=MEDIUM_SCALE, **needs):
-    medium = medium_of(values, medium_scale, 0.5)
-    scene = scene_of(medium)
-    found = prepare(scene, MajorantNeeds(**needs))
-    return found, found.majorants[id(medium)]
+    """The majorants of a medium in the unit cube, and its cells."""
+    matter = number_matter([medium_of(values, medium_scale, 0.5)])
+    volumes = [prepare_volume(volume, np.full(3, 0.5)) for volume in matter.volumes]
+    found = choose_majorants(matter, volumes, MajorantNeeds(**needs))
+    return found, found.tables[0]
 
 
 def bounds_of(values):
@@ -67,8 +72,8 @@ def rows_of(found, values):
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("values", [GREY, COLOURED], ids=["grey", "coloured"])
 def test_every_row_holds_the_bound_and_the_controls_of_its_cell(values, kind, scale):
-    scene, found = prepared(values, majorant=kind, control="fitted", residual="mean", scale=scale)
-    assert scene.majorant == kind
+    chosen, found = prepared(values, majorant=kind, control="fitted", residual="mean", scale=scale)
+    assert chosen.kind == kind
     low, high, mean = rows_of(found, values)
     bound = controls.scaled_majorant(high, scale)
     if kind == "kdtree":
@@ -128,13 +133,13 @@ def test_auto_takes_what_costs_least_for_the_technique(control):
         "grid": choice.best_grid(bounds, edges, rate, control)[1],
         "kdtree": tree.cost,
     }
-    assert chosen.majorant == min(costs, key=costs.get)
+    assert chosen.kind == min(costs, key=costs.get)
 
 
 def test_scenes_without_grids_have_no_majorant():
     found = prepare(scene_of(medium_of(1.0)))
-    assert (found.majorant, found.majorants, found.volumes) == ("none", {}, {})
-    assert found.needs == MajorantNeeds()
+    assert (found.plan.chosen["majorant"], found.majorants, found.volumes) == ("none", (None,), ())
+    assert found.plan.needs == MajorantNeeds()
 
 
 def test_volumes_of_emission_and_temperature_are_prepared_once_each():
@@ -143,8 +148,9 @@ def test_volumes_of_emission_and_temperature_are_prepared_once_each():
         medium_of(GREY), albedo=albedo, emission=emission, temperature=temperature, temperature_scale=1.0
     )
     found = prepare(scene_of(medium))
-    assert list(found.volumes) == [id(v) for v in (medium.sigma_t, albedo, emission, temperature)]
-    assert list(found.majorants) == [id(medium)]
+    volumes = [prepared.volume for prepared in found.volumes]
+    assert len(volumes) == 4 and len(found.majorants) == 1
+    assert all(a is b for a, b in zip(volumes, (medium.sigma_t, albedo, emission, temperature), strict=True))
 
 
 @pytest.mark.parametrize("name", ["albedo", "emission", "temperature"])

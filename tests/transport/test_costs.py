@@ -44,7 +44,7 @@ def test_residual_ratio_is_best_where_the_control_is_the_mean(device):
     density = over_a_base(0.2)
     scene = scene_of(medium_of(density, 0.7, 0.5))
     probe = Probe(device, scene, transmittance="residual-ratio", majorant="global")
-    (cells,) = probe.prepared.majorants.values()
+    (cells,) = probe.prepared.majorants
     mean, variances = float(cells.residual[0, 0]), {}
     t = (np.arange(20_000) + 0.5) * (LENGTH / 20_000)
     along = trilinear(density, RAY[0] + t[:, None] * RAY[1])

@@ -122,7 +122,7 @@ def test_a_majorant_too_low_by_a_tenth_is_caught(device):
     probe = Probe(
         device, scene_of(medium_of(np.full((9, 8, 10), 0.7), 1.5)), majorant="grid", technique="delta"
     )
-    for majorant in probe.prepared.majorants.values():
+    for majorant in probe.prepared.majorants:
         majorant.majorant[...] *= np.float32(0.9)
     probe.upload()
     t, _, _, flaws, _ = sample_walks(probe, RAY, LENGTH, WALKS)

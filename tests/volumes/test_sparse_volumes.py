@@ -20,8 +20,10 @@ from clvol.accel.sparse_bounds import from_dense, sparse_bounds
 from clvol.accel.sparse_grid import tree_grid
 from clvol.accel.sparse_kdtree import build_tree, finest_lattice
 from clvol.planning import registry
+from clvol.planning.choices import Choices
+from clvol.planning.plan import Plan
 from clvol.scene.records import Medium
-from clvol.tables.prepare import MajorantNeeds, prepare
+from clvol.tables.prepare import prepare
 from clvol.volumes.brick_tree import MOST_EXTENT, BrickTree, is_scattered
 from clvol.volumes.bricks import BOUND_CELLS, BrickMap, build_bricks
 from clvol.volumes.tree import build_tiers, device_nodes, keys, rows_of
@@ -176,7 +178,7 @@ def test_look_ups_through_a_tree_have_the_same_bits(device, monkeypatch):
         if forced:
             force_trees(monkeypatch)
         probe = Probe(device, scene_of(medium), lookup="stochastic", majorant="global")
-        assert probe.config.top_trees == forced
+        assert probe.plan.settled.top_trees == forced
         out = [np.empty(len(points), np.float32) for _ in range(3)]
         found.append(probe.run(["density/stochastic.h"], LOOK_UPS, out, [points]))
     for without, through in zip(*found, strict=True):
@@ -230,7 +232,7 @@ def majorants_of(names):
 @pytest.mark.parametrize(("technique", "majorant"), majorants_of(unbiased("technique")))
 def test_collisions_through_trees_follow_the_exact_distribution(device, trees, depths, technique, majorant):
     probe = Probe(device, scene_of(medium_of_grid(WALKED, (12.0,))), technique=technique, majorant=majorant)
-    assert probe.config.tree_grid == (majorant == "grid")
+    assert probe.plan.has_tree_grid == (majorant == "grid")
     for name, ray in RAYS.items():
         length, tau = exit_distance(*ray), depths[name]
         t, weights, _, flaws, _ = sample_walks(probe, ray, length, WALKS)
@@ -255,12 +257,16 @@ def test_transmittance_through_trees_has_the_exact_mean(device, trees, depths, t
             assert abs(z_score(values.mean(dtype=float), variance, exact)) < largest_z(2), name
 
 
+def planned(scene, **choices):
+    return prepare(scene, Plan.of(scene, Choices(**choices)))
+
+
 def test_trees_and_arrays_are_walked_in_one_scene():
     """Where one medium is large and mostly empty, a compact one is walked by the same code."""
     scene = scene_of(medium_of_grid(lumps(6, places=6), (6.0,)))
     beside = replace(scene.shapes[0], interior=medium_of_grid(far_pair(4088), (6.0,)))
-    prepared = prepare(replace(scene, shapes=(*scene.shapes, beside)), MajorantNeeds("grid"))
-    assert all(found.links is not None and found.levels >= 1 for found in prepared.majorants.values())
+    prepared = planned(replace(scene, shapes=(*scene.shapes, beside)), majorant="grid")
+    assert all(found.links is not None and found.levels >= 1 for found in prepared.majorants)
 
 
 def far_pair(apart):
@@ -282,17 +288,19 @@ def test_memory_follows_what_a_volume_holds_and_not_its_box(name):
     leaves = len(grid.leaf_origins)
     scene = scene_of(medium_of_grid(grid, (4000.0,)))
     tracemalloc.start()
-    prepared = prepare(scene, MajorantNeeds("auto", "fitted", "mean"))
+    prepared = planned(
+        scene, technique="weighted-decomposition", transmittance="residual-ratio", control="mean"
+    )
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    ((volume,), (majorant,)) = prepared.volumes.values(), prepared.majorants.values()
+    ((volume,), (majorant,)) = prepared.volumes, prepared.majorants
     bricks = volume.bricks
     assert bricks.brick_count <= 8 * leaves + 1
     assert bricks.top.nbytes <= 2048 * (1 + 8 * leaves * bricks.levels)
     tables = [majorant.nodes, majorant.links, majorant.majorant, majorant.control, majorant.residual]
     assert sum(t.nbytes for t in tables if t is not None) < 200_000 * leaves
     assert peak < (8 << 20) + 500_000 * leaves
-    assert prepared.majorant != "global"
+    assert prepared.plan.chosen["majorant"] != "global"
 
 
 @pytest.mark.parametrize("majorant", ["grid", "kdtree"])

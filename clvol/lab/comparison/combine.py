@@ -53,9 +53,11 @@ def open_lineup(
         opened(number, len(products))
         said = _said(wanted, varied)
         try:
+            choices = Choices.for_scene(scene, wanted)
+            choices = choices.but(step=step if _marches(choices.names) else None)
             if not trials:  # the first of a process pays for what the others find done: opened, and forgotten
-                Trial.open(device, scene, _choices(scene, wanted, step))
-            trial = Trial.open(device, scene, _choices(scene, wanted, step))
+                Trial.open(device, scene, choices)
+            trial = Trial.open(device, scene, choices)
         except OptionError as error:
             left_out.append((said, str(error)))
             continue
@@ -71,13 +73,6 @@ def open_lineup(
     labels = _labels(trials, varied)
     named = tuple((said, labels[trials.index(trial)]) for said, trial in doubles)
     return Lineup(dict(zip(labels, trials, strict=True)), tuple(left_out), named)
-
-
-def _choices(scene: Scene, wanted: Mapping[str, str], step: float | None) -> Choices:
-    """The scene's own choice in the place of "auto", as `clvol.render` does it."""
-    own = scene.integrator.choices
-    names = {f: own.get(f, "auto") if name == "auto" else name for f, name in wanted.items()}
-    return Choices(**names, step=step if _marches(names) else None)
 
 
 def _marches(names: Mapping[str, str]) -> bool:

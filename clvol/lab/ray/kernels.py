@@ -1,6 +1,6 @@
 """The renderer's device functions round one ray: small kernels that read the scene as a render does.
 
-What they run is the headers that the configuration's own stages include, with hooks that record the walk
+What they run is the headers that the plan's own stages include, with hooks that record the walk
 (cl/ray/recorder.h); nothing of a tracker is repeated here.
 """
 
@@ -17,12 +17,12 @@ from clvol import layout
 from clvol.device import programs
 from clvol.device.device import Device, set_arguments
 from clvol.planning import registry
-from clvol.planning.choices import Choices, prepare_for
-from clvol.planning.config import KernelConfig
-from clvol.rendering.session import kernel_config, render_record, seed_words
+from clvol.planning.choices import Choices
+from clvol.planning.plan import Plan
+from clvol.rendering.session import on_device, render_record, seed_words
 from clvol.rendering.upload import upload_scene
 from clvol.scene.records import Scene
-from clvol.tables.prepare import PreparedScene
+from clvol.tables.prepare import PreparedScene, prepare
 
 GROUP = 64
 OUTCOME_SIZE, EVENT_SIZE, CELL_SIZE = 9, 5, 10
@@ -37,19 +37,21 @@ class RayKernels:
     """One scene on the device with one set of choices, and kernels along a ray."""
 
     device: Device
-    choices: Choices
     prepared: PreparedScene
-    config: KernelConfig
     buffers: dict[str, cl.Buffer]
 
     @classmethod
     def open(cls, device: Device, scene: Scene, choices: Choices) -> RayKernels:
         """Prepare and upload; OptionError for a combination that cannot be right."""
-        prepared = prepare_for(scene, choices)
-        config = kernel_config(prepared, choices, device)
-        buffers = upload_scene(device, prepared, config, choices.step)
+        prepared = on_device(prepare(scene, Plan.of(scene, choices)), device)
+        buffers = upload_scene(device, prepared)
         buffers["render"] = device.memory.upload(render_record(prepared, 0), "the camera")
-        return cls(device, choices, prepared, config, buffers)
+        return cls(device, prepared, buffers)
+
+    @property
+    def plan(self) -> Plan:
+        """What is compiled."""
+        return self.prepared.plan
 
     def places(self, origin: np.ndarray, direction: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
         """Surfaces on a ray, float32 (n, 3): t, number, entering; and each medium's interval, float64
@@ -67,12 +69,12 @@ class RayKernels:
     ) -> tuple[np.ndarray, np.ndarray | None]:
         """sigma_t at even steps of a ray, float32 (channels, points), and the cells of the majorant, float32
         (n, CELL_SIZE), None where `family` walks none or is None."""
-        channels = 3 if self.config.features.chromatic_extinction else 1
+        channels = 3 if self.plan.features.chromatic_extinction else 1
         walks = family is not None and self._tracker(family).walks_majorant
         macros = {
             "CLVOL_RAY_MAJORANT": walks,
-            "CLVOL_RAY_CONTROLS": family == "technique" and self.config.needs_controls,
-            "CLVOL_RAY_RESIDUALS": family == "transmittance" and self.config.needs_residuals,
+            "CLVOL_RAY_CONTROLS": family == "technique" and self.plan.needs_controls,
+            "CLVOL_RAY_RESIDUALS": family == "transmittance" and self.plan.needs_residuals,
         }
         sigma = np.empty((channels, points), np.float32)
         cells, count = np.full((MOST_CELLS, CELL_SIZE), np.nan, np.float32), np.zeros(1, np.uint32)
@@ -93,11 +95,7 @@ class RayKernels:
         return outcomes, [events[: int(o[-1])] for events, o in zip(log, outcomes, strict=False)]
 
     def _tracker(self, family: str) -> registry.Choice:
-        return (
-            self.config.tracker
-            if family == "technique"
-            else registry.TRANSMITTANCES[self.config.transmittance]
-        )
+        return self.plan.tracker if family == "technique" else self.plan.estimator
 
     def _run(
         self,
@@ -110,13 +108,13 @@ class RayKernels:
     ) -> None:
         """Run cl/ray/`name`.cl for `count` work-items; `outputs` go in and come back."""
         flags = {macro: int(value) for macro, value in macros.items()}
-        source = programs.compose(self.config, f'#include "ray/{name}.cl"\n', flags)
+        source = programs.compose(self.plan, f'#include "ray/{name}.cl"\n', flags)
         kernel = cl.Kernel(programs.build(self.device, source, f"ray/{name}"), name)
         memory = self.device.memory
         unused = memory.allocate(4, "an argument", "")
         scene = [
             np.uint32(1) if a.name == "slot_stride" else self.buffers.get(a.name, unused)
-            for a in layout.arguments(self.config.macros)
+            for a in layout.arguments(self.plan.macros)
         ]
         arrays = [memory.upload(array, "the walks", "watch fewer of them") for array in (*inputs, *outputs)]
         set_arguments(kernel, *scene, *arrays, *scalars)

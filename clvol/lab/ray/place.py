@@ -13,7 +13,7 @@ from clvol.lab.ray.kernels import RayKernels
 from clvol.scene.boundaries import entry_bounds
 from clvol.scene.material_facts import is_transmissive, passes_light
 from clvol.scene.materials import Null
-from clvol.scene.records import ConstVolume, Medium
+from clvol.tables.apart import peak_extinction
 from clvol.tables.camera import CameraRays, camera_rays
 from clvol.tables.prepare import PreparedScene
 
@@ -161,13 +161,14 @@ def _presence(prepared: PreparedScene, bits: np.ndarray) -> np.ndarray:
 
 def pixel_hint(prepared: PreparedScene, x: int, y: int) -> str:
     """Another pixel than (x, y), towards the middle of a medium, where one is in the picture."""
-    if all(_is_empty(prepared, entry.medium) for entry in prepared.boundaries.entries):
+    empty = [_is_empty(prepared, number) for number in range(len(prepared.boundaries.entries))]
+    if all(empty):
         return "the scene has no density anywhere"
     rays = _camera_rays(prepared)
     width, height = prepared.scene.film.window[2:]
     bounds = entry_bounds(prepared.scene, prepared.boundaries)
-    for entry, (lower, upper) in zip(prepared.boundaries.entries, bounds, strict=True):
-        if _is_empty(prepared, entry.medium) or not np.isfinite([lower, upper]).all():
+    for is_empty, (lower, upper) in zip(empty, bounds, strict=True):
+        if is_empty or not np.isfinite([lower, upper]).all():
             continue
         towards = (lower + upper) / 2 - prepared.centre - rays.eye
         a, b, depth = np.linalg.solve(np.column_stack([rays.base_dx, rays.base_dy, rays.base]), towards)
@@ -179,8 +180,7 @@ def pixel_hint(prepared: PreparedScene, x: int, y: int) -> str:
     return "choose a pixel where the picture shows a medium"
 
 
-def _is_empty(prepared: PreparedScene, medium: Medium) -> bool:
-    """Whether its density is 0 everywhere."""
-    volume = medium.sigma_t
-    largest = volume.value if isinstance(volume, ConstVolume) else prepared.volumes[id(volume)].bricks.peak
-    return not np.any(largest) or not np.any(medium.scale)
+def _is_empty(prepared: PreparedScene, entry: int) -> bool:
+    """Whether the density of an entry's medium is 0 everywhere."""
+    number = prepared.matter.of_entry[entry]
+    return not np.any(peak_extinction(prepared.matter.media[number], prepared.density(number)))

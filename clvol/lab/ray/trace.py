@@ -19,7 +19,7 @@ from clvol.lab.ray.view import RayView
 from clvol.lab.ray.walks import UNNAMED, Watched, read_walk
 from clvol.planning import registry
 from clvol.planning.choices import Choices
-from clvol.planning.features import is_homogeneous
+from clvol.scene.medium_facts import is_homogeneous
 from clvol.scene.records import Scene
 
 log = logging.getLogger("clvol")
@@ -146,12 +146,9 @@ def _name(medium: Any) -> str:
 
 def _choices(scene: Scene, given: dict[str, Any]) -> Choices:
     """The caller's choices, else the scene's, else auto."""
-    names = {
-        f: given[f] if given.get(f, "auto") != "auto" else scene.integrator.choices.get(f, "auto")
-        for f in registry.FAMILIES
-    }
-    step = given.get("step") if "marching" in names.values() else None
-    return Choices(**names, majorant_scale=given.get("majorant_scale", 1.0), step=step)
+    names = {family: given[family] for family in registry.FAMILIES if family in given}
+    choices = Choices.for_scene(scene, names, majorant_scale=given.get("majorant_scale", 1.0))
+    return choices.but(step=given.get("step") if "marching" in choices.names.values() else None)
 
 
 def _to_watch(
@@ -162,12 +159,12 @@ def _to_watch(
 ) -> tuple[list[tuple[str, str]], list[str]]:
     """(family, name) of everything to watch, and notes on what is left out."""
     notes = []
-    resolved = {"technique": base.config.technique, "transmittance": base.config.transmittance}
+    resolved = base.plan.chosen
     if not heterogeneous:
-        if base.config.features.heterogeneous or techniques or transmittances:
+        if base.plan.features.heterogeneous or techniques or transmittances:
             notes.append("This medium is homogeneous: every technique follows it in closed form.")
         return [("technique", resolved["technique"])], notes
-    chromatic = base.config.features.chromatic_extinction
+    chromatic = base.plan.features.chromatic_extinction
     if techniques is None:
         techniques = (
             ("delta", "spectral", "spectral-decomposition")
@@ -179,7 +176,7 @@ def _to_watch(
     found = [("technique", resolved["technique"] if n == "auto" else n) for n in techniques]
     shadows = [("transmittance", resolved["transmittance"] if n == "auto" else n) for n in transmittances]
     shadows = [pair for pair in shadows if pair[1] != "none"]  # what auto may come to
-    if shadows and not (base.config.features.samples_lights and base.config.features.scattering):
+    if shadows and not (base.plan.features.samples_lights and base.plan.features.scattering):
         notes.append("No light is sampled in this scene's media, so that renders estimate no transmittance.")
         shadows = []
     if not found + shadows:
@@ -216,10 +213,10 @@ def _watch(
 ) -> Watched:
     """Walks of one technique or transmittance, and the majorant it walks."""
     seed, many, shown = numbers
-    config, given = kernels.config, _given(place, channel)
+    plan, given = kernels.plan, _given(place, channel)
     _, cells = kernels.tables(given, family if heterogeneous else None, 1)
     outcomes, events = kernels.walks(given, family, seed, many, shown)
-    name = getattr(config, family)
+    name = plan.chosen[family]
     if outcomes[:, 7].any():
         flawed = int((outcomes[:, 7] > 0).sum())
         log.warning(
@@ -230,7 +227,7 @@ def _watch(
     return Watched(
         family,
         name if heterogeneous else "analytic",
-        config.majorant if cells is not None else "none",
+        plan.chosen["majorant"] if cells is not None else "none",
         biased,
         None if cells is None else cells.astype(np.float64),
         outcomes,

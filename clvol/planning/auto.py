@@ -1,0 +1,93 @@
+"""What `auto` comes to, by fixed rules, each with its reason: the same seed must give the same bits."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from clvol.planning.names import Names
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from clvol.planning.features import Features
+
+DEFAULT_SAMPLER = "sobol"
+WEIGHED = "auto"
+"""The majorant of a plan until the volumes are prepared, which show what each kind would cost."""
+
+
+def resolve(
+    features: Features, asked: Mapping[str, str], own: Mapping[str, str] | None = None
+) -> tuple[Names, Names]:
+    """Every family's choice, and why.
+
+    `auto` follows the rules that docs/choices.md states; the majorant stays at it until volumes are prepared.
+
+    Parameters
+    ----------
+    asked : a name of every family, or "auto".
+    own : the names that the scene's integrator gives, which are among those asked for.
+    """
+    rules = {
+        "technique": _technique(features, asked),
+        "transmittance": _transmittance(features),
+        "majorant": (WEIGHED, "the one of least expected cost, once the volumes are prepared"),
+        "lookup": ("exact", "the volume's own filter"),
+        "absorption": ("mixed", "no path is absorbed that weighs much, none followed that weighs little"),
+        "probability": ("history", "weights stay bounded"),
+        "control": ("mean", "leaves the least residual to estimate"),
+        "sampler": (DEFAULT_SAMPLER, _SAMPLERS[DEFAULT_SAMPLER]),
+    }
+    names, reasons = {}, {}
+    for family, rule in rules.items():
+        names[family], reasons[family] = rule[0], f"auto: {rule[1]}"
+        if asked[family] != "auto":
+            names[family] = asked[family]
+            reasons[family] = "the scene's own" if (own or {}).get(family) == asked[family] else "asked for"
+    if not features.heterogeneous:
+        names["majorant"] = "none"
+    return Names(names), Names(reasons)
+
+
+_SAMPLERS = {
+    "sobol": "samples that cover every decision evenly",
+    "independent": "every number is independent of all others",
+}
+
+
+def _technique(features: Features, asked: Mapping[str, str]) -> tuple[str, str]:
+    """Chromatic media, too, take delta, a path for each channel.
+
+    Where collisions are light rather than scattering, exact flights are worth their look-ups: one
+    low-discrepancy number places the whole flight (docs/techniques.md).
+    """
+    sampler = DEFAULT_SAMPLER if asked["sampler"] == "auto" else asked["sampler"]
+    hurdles = {
+        "not every medium is dark and glows": not features.dark_emission,
+        "media overlap": features.media_overlap,
+        "channels are attenuated differently": features.chromatic_extinction,
+        "samples are independent": sampler != "sobol",
+        "look-ups are stochastic": asked["lookup"] == "stochastic",
+    }
+    against = [reason for reason, holds in hurdles.items() if holds]
+    if not against:
+        return (
+            "regular",
+            "collisions are the light, and one low-discrepancy number places a whole flight",
+        )
+    return "delta", f"exact flights do not pay where {against[0]}"
+
+
+def _transmittance(features: Features) -> tuple[str, str]:
+    """Scattering finds a constant sky as well as sampling it does, without the shadow ray."""
+    lights = {
+        "an envmap": features.envmap,
+        "directional": features.directional,
+        "points": features.point_lights,
+        "spots": features.spot,
+        "area lights": features.area,
+    }
+    found = [name for name, there in lights.items() if there]
+    if found:
+        return "ratio", f"lights to sample: {', '.join(found)}"
+    return "none", "scattered paths find a uniform sky by themselves" if features.constant else "no light"

@@ -1,0 +1,174 @@
+"""What follows from a scene's features and the choices made for it: is this needed, and how many?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, cast
+
+from clvol import layout
+from clvol.planning import registry
+from clvol.planning.needs import MajorantNeeds
+from clvol.planning.settled import FAR_APART, Settled, Tuning
+
+if TYPE_CHECKING:
+    from clvol.accel.controls import ResidualControl
+    from clvol.planning.choices import Choices
+    from clvol.planning.features import Features
+    from clvol.planning.names import Names
+    from clvol.scene.boundaries import Boundaries
+
+
+@dataclass(frozen=True)
+class Decisions:
+    """What follows from the features of a scene and the choices made for it, one question after the other.
+
+    Parameters
+    ----------
+    features : what the scene uses.
+    choices : what was asked for.
+    chosen : a choice of every family; the majorant's stays "auto" until volumes are prepared, and is "none"
+        where no medium is heterogeneous.
+    reasons : why, by family.
+    boundaries : what bounds the media, which tables are made from; not compared.
+    settled : what only the volumes show; None before they are prepared.
+    tuning : what the kind of device decides.
+    """
+
+    features: Features
+    choices: Choices
+    chosen: Names
+    reasons: Names
+    boundaries: Boundaries = field(repr=False, compare=False)
+    settled: Settled | None = None
+    tuning: Tuning = field(default_factory=Tuning)
+
+    @property
+    def tracker(self) -> registry.Choice:
+        """The technique's entry in the registry."""
+        return registry.TECHNIQUES[self.chosen["technique"]]
+
+    @property
+    def estimator(self) -> registry.Choice:
+        """The transmittance's entry in the registry."""
+        return registry.TRANSMITTANCES[self.chosen["transmittance"]]
+
+    @property
+    def channels(self) -> int:
+        """Channels of the image: 1 when every coefficient and light is grey, else 3."""
+        f = self.features
+        media = f.chromatic_extinction or f.chromatic_albedo or f.chromatic_emission
+        return 3 if media or f.chromatic_light or f.chromatic_surfaces else 1
+
+    @property
+    def far_apart(self) -> bool:
+        """Channels' extinctions differ too much for one path."""
+        return self.settled is not None and self.settled.channels_apart > FAR_APART
+
+    @property
+    def one_channel_per_path(self) -> bool:
+        """Whether a path follows one channel, so that a sample is a path for each.
+
+        That is where channels are attenuated or absorbed differently and the technique cannot follow them
+        together (METHODS §3, delta); it spares the noise of choosing one.  Homogeneous media can be followed
+        together, but for channels that are too far apart.
+        """
+        f = self.features
+        if self.far_apart and not self.tracker.all_channels:
+            return True
+        if f.heterogeneous and not self.tracker.all_channels:
+            sampled = f.chromatic_albedo and self.chosen["absorption"] == "sample"
+            return f.chromatic_extinction or sampled
+        return False
+
+    @property
+    def spectrum(self) -> int:
+        """Floats that a path's weight holds."""
+        return 1 if self.one_channel_per_path else self.channels
+
+    @property
+    def extinction(self) -> int:
+        """Floats of a coefficient or transmittance: 3 where a path's channels are attenuated differently."""
+        return 3 if self.features.chromatic_extinction and not self.one_channel_per_path else 1
+
+    @property
+    def jobs_per_sample(self) -> int:
+        """Paths of one sample: one for each channel, where a path follows one."""
+        return self.channels if self.one_channel_per_path else 1
+
+    @property
+    def weighted(self) -> bool:
+        """Walks change the path's weight."""
+        return self.extinction == 3 or (self.features.heterogeneous and self.tracker.weighted)
+
+    @property
+    def nee(self) -> bool:
+        """Next-event estimation: there are lights to sample, and media or surfaces that scatter to them."""
+        f = self.features
+        sampled = f.samples_lights and (f.scattering or f.samples_at_surfaces)
+        return self.chosen["transmittance"] != "none" and sampled
+
+    @property
+    def mis(self) -> bool:
+        """Both ways of finding a light are in use, so that they must be weighted."""
+        f = self.features
+        return self.nee and (f.constant or f.envmap or f.area)
+
+    @property
+    def walks_majorants(self) -> bool:
+        """Some stage walks majorant cells."""
+        shadows = self.nee and self.estimator.walks_majorant
+        return self.chosen["majorant"] != "none" and (self.tracker.walks_majorant or shadows)
+
+    @property
+    def has_tree_grid(self) -> bool:
+        """The majorant is a grid whose cells are found through a tree."""
+        return self.settled is not None and self.settled.tree_grid
+
+    @property
+    def needs_controls(self) -> bool:
+        """The technique walks a control of each majorant cell."""
+        return self.chosen["majorant"] != "none" and self.tracker.control != "none"
+
+    @property
+    def needs_residuals(self) -> bool:
+        """Transmittance is estimated over a control of each majorant cell."""
+        residual = self.chosen["transmittance"] == "residual-ratio"
+        return self.chosen["majorant"] != "none" and self.nee and residual
+
+    @property
+    def needs(self) -> MajorantNeeds:
+        """What the cells of the majorant have to carry."""
+        residual = self.chosen["transmittance"] == "residual-ratio"
+        return MajorantNeeds(
+            self.choices["majorant"],
+            self.tracker.control,
+            cast("ResidualControl", self.chosen["control"]) if residual else "none",
+            self.choices.majorant_scale,
+        )
+
+    @property
+    def randomizations(self) -> int:
+        """Independent randomisations that the samples are dealt to; 0 where every sample is independent."""
+        return layout.RANDOMIZATIONS if self.chosen["sampler"] == "sobol" else 0
+
+    @property
+    def pixel_list(self) -> bool:
+        """Runs are over listed pixels, each at a sample of its own."""
+        return self.choices.target_error is not None
+
+    @property
+    def first_hit(self) -> tuple[str, ...]:
+        """Pictures of what camera paths first meet that are asked for."""
+        return tuple(name for name in registry.FIRST_HIT if name in self.choices.aov)
+
+    @property
+    def shown(self) -> frozenset[str]:
+        """Pictures whose numbers are kept: those asked for, look-ups, and what others are made from."""
+        of = {"null": ("tentative", "real"), "efficiency": ("cells",)}
+        asked = self.choices.aov
+        return frozenset(("lookups", *asked, *(n for name in asked for n in of.get(name, ()))))
+
+    @property
+    def mixes_far_channels(self) -> bool:
+        """Whether one path follows channels whose extinctions are too far apart for it."""
+        return self.far_apart and self.extinction == 3

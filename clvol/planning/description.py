@@ -1,0 +1,71 @@
+"""A plan in lines of text: what `clvol info SCENE` and `clvol render -v` print of it."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import TYPE_CHECKING
+
+from clvol import layout
+from clvol.planning.compiled import filled_slots, plan_macros
+from clvol.planning.in_force import reasons, used_names
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from clvol.planning.decisions import Decisions
+
+WIDTH = 110
+
+
+def describe_plan(plan: Decisions) -> Iterator[str]:
+    """Choices with their reasons, features, channels, stages, the path's state, and what is compiled."""
+    yield "choices"
+    why, macros = reasons(plan), plan_macros(plan)
+    for family, name in used_names(plan).items():
+        yield f"  {family:<14} {name:<22} {why[family]}".rstrip()
+    yield from _paragraph("features", plan.features.found() or "none")
+    yield f"channels: {_channels(plan)}"
+    if plan.walks_majorants:
+        yield f"majorant cells: {_cells(plan)}"
+    yield f"units built: {', '.join((*layout.launched(macros), 'accumulate'))}"
+    fields = layout.path_fields(macros)
+    names = ", ".join(field.name for field in fields)
+    yield from _paragraph("path state", f"{4 * len(fields)} bytes per slot ({names})")
+    yield f"headers chosen: {', '.join(chosen_headers(plan))}"
+    defined = (f"{name.removeprefix('CLVOL_')}={value}" for name, value in macros.items() if value)
+    yield from _paragraph("macros other than 0, CLVOL_...", ", ".join(defined))
+
+
+def chosen_headers(plan: Decisions) -> list[str]:
+    """Headers of the choices in force, under cl/."""
+    slots = filled_slots(plan)
+    used = ["sampler"]
+    if plan.features.heterogeneous:
+        used += ["lookup", "technique", *(["transmittance"] if plan.nee else [])]
+    if plan.walks_majorants:
+        used.append("majorant")
+    return [f"{family} {slots[family]}" for family in used if family in slots]
+
+
+def _channels(plan: Decisions) -> str:
+    if plan.channels == 1:
+        return "1, everything is grey"
+    if plan.one_channel_per_path:
+        return "3, a path follows one of them, and a sample is a path for each"
+    apart = "attenuated differently" if plan.extinction == 3 else "attenuated alike"
+    return f"3, a path follows all of them, which are {apart}"
+
+
+def _cells(plan: Decisions) -> str:
+    """What the cells of the majorant carry."""
+    needs = plan.needs
+    found = [f"a bound of the density{f', times {needs.scale:g}' if needs.scale != 1 else ''}"]
+    if plan.needs_controls:
+        found.append(f"the technique's control ({needs.control})")
+    if plan.needs_residuals:
+        found.append(f"residual-ratio's control ({needs.residual}) and the bound of what it leaves")
+    return "; ".join(found)
+
+
+def _paragraph(title: str, text: str) -> list[str]:
+    return textwrap.wrap(f"{title}: {text}", WIDTH, subsequent_indent="  ", break_on_hyphens=False)

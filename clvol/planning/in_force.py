@@ -1,0 +1,98 @@
+"""Which choices a scene has a use for, and what is to be said of those that it has none for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from clvol.planning import registry
+from clvol.planning.names import Names
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from clvol.planning.decisions import Decisions
+
+
+def used_names(plan: Decisions) -> Names:
+    """The choices in force: "none" where the scene has no use for a family, "analytic" for closed forms."""
+    features, chosen = plan.features, plan.chosen
+    walks = features.heterogeneous
+    analytic = "analytic" if features.homogeneous else "none"
+    interpolates = features.trilinear or not features.nearest
+    chooses = plan.spectrum == 3 and (plan.extinction == 3 or chosen["absorption"] == "sample")
+    used = {
+        "technique": chosen["technique"] if walks else analytic,
+        "transmittance": (chosen["transmittance"] if walks else analytic) if plan.nee else "none",
+        "majorant": chosen["majorant"] if plan.walks_majorants else "none",
+        "lookup": chosen["lookup"] if walks and interpolates else "none",
+        "absorption": chosen["absorption"] if features.media and features.scattering else "none",
+        "probability": chosen["probability"] if walks and plan.weighted and chooses else "none",
+        "control": chosen["control"] if plan.needs_residuals else "none",
+        "sampler": chosen["sampler"],
+    }
+    return Names(used)
+
+
+def _entries(plan: Decisions) -> list[tuple[str, str, registry.Choice]]:
+    """Family, name and the registry's entry of every choice in force."""
+    used = ((f, name, registry.FAMILIES[f].get(name)) for f, name in used_names(plan).items())
+    return [(family, name, choice) for family, name, choice in used if choice is not None]
+
+
+def biased_choices(plan: Decisions) -> list[str]:
+    """The choices in force whose pictures are biased, as "family name"."""
+    return [f"{family} {name}" for family, name, choice in _entries(plan) if choice.biased]
+
+
+def need_bound(plan: Decisions) -> bool:
+    """Whether a choice in force is right only where majorants bound the density."""
+    return any(choice.needs_bound for _, _, choice in _entries(plan))
+
+
+def reasons(plan: Decisions) -> dict[str, str]:
+    """Why each choice is in force, or none is, by family."""
+    features, used = plan.features, used_names(plan)
+    closed = "closed forms: all media are homogeneous"
+    without = {
+        "technique": closed if features.media else "there are no media",
+        "transmittance": closed if plan.nee else "no light is sampled: nothing scatters to one that could be",
+        "majorant": "nothing walks majorant cells",
+        "lookup": "samples are not interpolated" if features.heterogeneous else "no density is looked up",
+        "absorption": "no medium scatters",
+        "probability": "no walk has weights of several channels",
+        "control": "only residual-ratio subtracts one",
+        "sampler": "",
+    }
+    found = {}
+    for family, name in used.items():
+        meant = name == plan.chosen[family] and not (family == "majorant" and name == "none")
+        found[family] = plan.reasons[family] if meant else without[family]
+    return found
+
+
+def warnings(plan: Decisions, asked: Mapping[str, str]) -> Iterator[str]:
+    """What a user should hear of: own choices that are not used, a picture left black, biased or too noisy.
+
+    Parameters
+    ----------
+    asked : names by family that the caller gave, "auto" included.
+    """
+    used, features = used_names(plan), plan.features
+    for family, value in asked.items():
+        if value not in ("auto", used[family]):
+            reason = f"the scene's media need only the {used[family]} rule"
+            if used[family] == "none":
+                reason = f"nothing in this render needs {'an' if family[0] in 'aeiou' else 'a'} {family}"
+            yield f"{family} {value} is not used: {reason}"
+    if plan.choices.majorant_scale != 1 and used["majorant"] == "none":
+        yield "majorant_scale is not used: nothing in this render walks a majorant"
+    if not features.emitters and not features.emission:
+        yield "the scene has no emitter: its picture is black"
+    if plan.settled is not None and plan.mixes_far_channels:
+        yield (
+            f"extinctions of the channels differ by 1 : {plan.settled.channels_apart:.2g}, and technique "
+            f"{plan.chosen['technique']} follows them with one path: most of what the thinnest scatters may "
+            "never be sampled, nor the error show it; technique auto or delta has a path for each channel"
+        )
+    for what in biased_choices(plan):
+        yield f"{what} is BIASED: the picture's mean is off by an unknown amount"

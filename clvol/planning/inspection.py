@@ -1,0 +1,190 @@
+"""What a scene uses, found from its records."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from clvol.base.rows import bands
+from clvol.planning.features import Features
+from clvol.scene import records
+from clvol.scene.boundaries import Boundaries, camera_may_be_inside, is_clipped, may_overlap
+from clvol.scene.material_facts import (
+    bsdf_kinds,
+    bsdf_sides,
+    bsdf_textures,
+    has_bitmaps,
+    has_tables,
+    is_transmissive,
+    passes_light,
+    reflects,
+    samples_lights,
+)
+from clvol.scene.material_facts import is_grey as bsdf_is_grey
+from clvol.scene.medium_facts import (
+    bounding_kind,
+    channels_of,
+    glows_in_the_dark,
+    is_grey,
+    is_homogeneous,
+    medium_volumes,
+    scatters,
+)
+from clvol.scene.phase import phase_lobes
+from clvol.scene.primitives import QUADRICS, mesh_of
+from clvol.scene.thinness import thin_media
+
+if TYPE_CHECKING:
+    from clvol.scene.materials import Bsdf
+
+
+def find_features(scene: records.Scene, found: Boundaries) -> Features:
+    """Inspect a scene; a pure function of its records and of what bounds its media."""
+    surfaces = [scene.shapes[n] for n in found.surfaces]
+    lamps = [s for s in surfaces if s.emission is not None]
+    media = [entry.medium for entry in found.entries]
+    return Features(
+        **_place_features(scene, found),
+        **_medium_features(media),
+        **_volume_features([v for m in media for v in medium_volumes(m)]),
+        **_surface_features(surfaces),
+        **_light_features(scene, media, surfaces, lamps),
+        passable=any(passes_light(s.bsdf) for s in surfaces)
+        or (bool(lamps) and scene.integrator.hide_emitters),
+        filter_table=scene.film.rfilter.kind != "box",
+        signed_filter=scene.film.rfilter.signed,
+        lens=scene.sensor.aperture_radius > 0,
+        depth_limited=scene.integrator.max_depth >= 0,
+        hide_emitters=scene.integrator.hide_emitters,
+    )
+
+
+def _place_features(scene: records.Scene, found: Boundaries) -> dict[str, Any]:
+    """Where media are, and what bounds them."""
+    bounds = {bounding_kind(entry.shape) for entry in found.entries if entry.shape is not None}
+    return {
+        "clipped": any(is_clipped(e.medium) for e in found.entries) or _clips_homogeneous(found),
+        "thin": any(thin_media(scene, found)),
+        "media_overlap": may_overlap(scene, found),
+        "cubes": "cube" in bounds,
+        "spheres": "sphere" in bounds,
+        "boundaries": len(found.boundaries),
+        "camera_inside": camera_may_be_inside(scene, found),
+    }
+
+
+def _medium_features(media: list[records.Medium]) -> dict[str, Any]:
+    """What media are made of, and do to light."""
+    varied = [m for m in media if not is_homogeneous(m)]
+    emissive = [m for m in media if m.emits]
+    lobes = [phase_lobes(m.phase) for m in media]
+    phases = {lobe.kind for mixture in lobes for lobe, _ in mixture}
+    return {
+        "media": len(media),
+        "homogeneous": any(is_homogeneous(m) for m in media),
+        "heterogeneous": bool(varied),
+        "chromatic_extinction": any(not is_grey(m.sigma_t) or len(set(m.scale)) > 1 for m in media),
+        "coloured_extinction": any(
+            isinstance(m.sigma_t, records.GridVolume) and channels_of(m.sigma_t) > 1 for m in media
+        ),
+        "chromatic_albedo": any(not is_grey(m.albedo) for m in media),
+        "chromatic_emission": any(
+            m.temperature is not None
+            or (m.emission is not None and not is_grey(m.emission))
+            or len(set(m.emission_scale)) > 1
+            for m in emissive
+        ),
+        "albedo_volumes": any(isinstance(m.albedo, records.GridVolume) for m in media),
+        "emission": bool(emissive),
+        "emission_volumes": any(isinstance(m.emission, records.GridVolume) for m in emissive),
+        "temperature": any(isinstance(m.temperature, records.GridVolume) for m in emissive),
+        "dark_emission": bool(varied) and all(map(glows_in_the_dark, varied)),
+        "phases": tuple(sorted(kind.upper() for kind in phases)),
+        "blend": any(len(mixture) > 1 for mixture in lobes),
+        "scattering": any(map(scatters, media)),
+    }
+
+
+def _volume_features(volumes: list[records.GridVolume]) -> dict[str, Any]:
+    """How fields are looked up."""
+    return {
+        "volumes": len(volumes),
+        "trilinear": any(v.filter_type == "trilinear" for v in volumes),
+        "nearest": any(v.filter_type == "nearest" for v in volumes),
+        "coloured_volumes": any(channels_of(v) > 1 for v in volumes),
+    }
+
+
+def _surface_features(surfaces: list[records.Shape]) -> dict[str, Any]:
+    """What rays meet beside media."""
+    meshes = [mesh_of(s) for s in surfaces if s.kind not in QUADRICS]
+    bsdfs = [s.bsdf for s in surfaces]
+    textures = any(bsdf_textures(b) for b in bsdfs)
+    return {
+        "surfaces": len(surfaces),
+        "triangles": bool(meshes),
+        "quadrics": any(s.kind in QUADRICS for s in surfaces),
+        "shading_normals": any(m.normals is not None for m in meshes),
+        "vertex_uvs": any(m.uvs is not None for m in meshes) and (textures or any(map(_turns, bsdfs))),
+        "bsdfs": tuple(sorted(set().union(*(bsdf_kinds(b) for b in bsdfs)))),
+        "chromatic_surfaces": not all(map(bsdf_is_grey, bsdfs)),
+        "textures": textures,
+        "bitmaps": any(map(has_bitmaps, bsdfs)),
+        "material_tables": any(map(has_tables, bsdfs)),
+        "reflecting": any(map(reflects, bsdfs)),
+        "samples_at_surfaces": any(map(samples_lights, bsdfs)),
+        "transmissive": any(map(is_transmissive, bsdfs)),
+    }
+
+
+def _light_features(
+    scene: records.Scene,
+    media: list[records.Medium],
+    surfaces: list[records.Shape],
+    lamps: list[records.Shape],
+) -> dict[str, Any]:
+    """Where light comes from; `lamps`: the surfaces that shine."""
+    kinds = {type(e) for e in scene.emitters}
+    grey = all(map(_emitter_is_grey, scene.emitters)) and all(len(set(s.emission or ())) == 1 for s in lamps)
+    sampled = any(m.sample_emitters for m in media) or bool(surfaces)
+    return {
+        "emitters": len(scene.emitters) + len(lamps),
+        "chromatic_light": not grey,
+        "constant": records.ConstantEmitter in kinds,
+        "envmap": records.EnvmapEmitter in kinds,
+        "directional": records.DirectionalEmitter in kinds,
+        "point_lights": records.PointEmitter in kinds,
+        "spot": records.SpotEmitter in kinds,
+        "area_meshes": any(s.kind not in QUADRICS for s in lamps),
+        "area_spheres": any(s.kind == "sphere" for s in lamps),
+        "area_disks": any(s.kind == "disk" for s in lamps),
+        "area_cylinders": any(s.kind == "cylinder" for s in lamps),
+        "samples_lights": bool(scene.emitters or lamps) and sampled,
+    }
+
+
+def _turns(bsdf: Bsdf) -> bool:
+    """Whether the direction of its tangents matters."""
+    sides = [side.bsdf for side in bsdf_sides(bsdf) if side is not None]
+    return any(getattr(b, "alpha_u", 0) != getattr(b, "alpha_v", 0) for b in sides)
+
+
+def _clips_homogeneous(found: Boundaries) -> bool:
+    """Boundaries hold a homogeneous medium, which their world box bounds as well: no path strays for ever."""
+    held = {b.interior for b in found.boundaries}
+    return any(
+        e.shape is None and not e.everywhere and e.medium.homogeneous and n in held
+        for n, e in enumerate(found.entries)
+    )
+
+
+def _emitter_is_grey(emitter: records.Emitter) -> bool:
+    if isinstance(emitter, records.EnvmapEmitter):
+        r = emitter.radiance
+        return all(bool((r[rows] == r[rows, :, :1]).all()) for rows in bands(*r.shape[:2]))
+    value = {
+        records.ConstantEmitter: "radiance",
+        records.DirectionalEmitter: "irradiance",
+        records.PointEmitter: "intensity",
+        records.SpotEmitter: "intensity",
+    }[type(emitter)]
+    return len(set(getattr(emitter, value))) == 1

@@ -1,0 +1,60 @@
+"""Combinations that cannot be right: every refusal is one sentence on why, and one on what to use."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from clvol.errors import OptionError
+from clvol.planning import registry
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from clvol.planning.choices import Choices
+    from clvol.planning.features import Features
+
+
+def refuse_impossible(features: Features, choices: Choices, chosen: Mapping[str, str]) -> None:
+    """Raise OptionError for a combination that cannot be right, saying why and what to use."""
+    technique, transmittance = chosen["technique"], chosen["transmittance"]
+    tracker, estimator = registry.TECHNIQUES[technique], registry.TRANSMITTANCES[transmittance]
+    if transmittance == "none" and (features.directional or features.point_lights or features.spot):
+        raise OptionError(
+            "transmittance 'none' cannot render point, spot and directional lights",
+            hint="only next-event estimation reaches them: use ratio",
+        )
+    marches = features.heterogeneous and (tracker.biased or estimator.biased)
+    if choices.step is not None and not marches:
+        raise OptionError(
+            "step is for ray marching, and nothing marches here",
+            hint="choose technique or transmittance marching",
+        )
+    if not features.heterogeneous:
+        return  # closed forms take the place of every technique and transmittance
+    used = [("technique", technique, tracker, "weighted-delta")]
+    if features.samples_lights and features.scattering:
+        used.append(("transmittance", transmittance, estimator, "ratio"))
+    for family, name, choice, instead in used:
+        if choices.majorant_scale < 1 and choice.needs_bound:
+            raise OptionError(
+                f"{family} {name!r} is biased where bounds are too low, as by a majorant_scale below 1",
+                hint=f"use one that carries weights, such as {instead}",
+            )
+        if chosen["lookup"] == "stochastic" and not choice.linear:
+            raise OptionError(
+                f"stochastic look-ups would bias {family} {name!r}, which is not linear in the density",
+                hint="use lookup exact",
+            )
+
+
+MOST_STEPS = 1e5
+"""Marching steps across the scene beyond which a step is taken for a mistake."""
+
+
+def refuse_fine_step(step: float | None, radius: float) -> None:
+    """Raise OptionError for a marching step that would never get across the scene."""
+    if step is not None and 2 * radius / step > MOST_STEPS:
+        raise OptionError(
+            f"step {step:g} is too fine: {2 * radius / step:.2g} steps across the scene",
+            hint=f"give at least {2 * radius / MOST_STEPS:.2g}",
+        )

@@ -1,0 +1,67 @@
+"""Grid volumes as brick maps, and their place in the scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from clvol.errors import SceneError
+from clvol.scene import records
+from clvol.scene.boundaries import is_clipped
+from clvol.scene.medium_facts import volume_roles
+from clvol.volumes.bricks import BrickMap, BrickTree, build_bricks
+from clvol.volumes.grid import DenseGrid
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedVolume:
+    """A grid volume as bricks, with the map from the scene's centred world to brick index space."""
+
+    volume: records.GridVolume
+    bricks: BrickMap | BrickTree
+    world_to_index: np.ndarray
+
+
+def prepare_volume(volume: records.GridVolume, centre: np.ndarray) -> PreparedVolume:
+    """Build a volume's bricks; `centre` is the world position that becomes the origin."""
+    grid, shift = volume.grid, np.zeros(3)
+    if volume.wrap_mode == "repeat" and isinstance(grid, DenseGrid):
+        wrapped = np.pad(grid.values, [(1, 1), (1, 1), (1, 1), (0, 0)], mode="wrap")
+        grid, shift = replace(grid, values=wrapped), np.full(3, -1.0)
+    bricks = build_bricks(grid)
+    to_world = volume.index_to_world.copy()
+    to_world[:3, 3] -= centre
+    to_brick = np.eye(4)
+    to_brick[:3, 3] = -(np.array(bricks.origin) + shift)
+    return PreparedVolume(volume, bricks, to_brick @ np.linalg.inv(to_world))
+
+
+def check_cover(medium: records.Medium) -> None:
+    """Refuse a volume that would need its wrap mode on the device: repeated or mirrored beyond its box.
+
+    Volumes of a medium are looked up wherever sigma_t is.
+
+    Raises
+    ------
+    SceneError
+        Such a volume's box is not that of sigma_t.
+    """
+    sigma_t = medium.sigma_t
+    for name, volume in volume_roles(medium).items():
+        if volume is sigma_t or volume.wrap_mode == "clamp":
+            continue
+        boxed = isinstance(sigma_t, records.GridVolume) and is_clipped(medium)
+        if not boxed or not np.allclose(_world_box(sigma_t), _world_box(volume)):
+            raise SceneError(
+                f"wrap_mode {volume.wrap_mode!r} of the {name} volume, whose box is not that of sigma_t",
+                volume.source or medium.name,
+                "give both volumes the same to_world, or use wrap_mode clamp",
+            )
+
+
+def _world_box(volume: records.Volume) -> np.ndarray:
+    """World positions of two opposite corners of a grid volume's box, float64 (4, 2)."""
+    assert isinstance(volume, records.GridVolume)
+    corners: np.ndarray = volume.index_to_world @ np.array([[*volume.lower, 1.0], [*volume.upper, 1.0]]).T
+    return corners
