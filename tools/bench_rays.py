@@ -34,6 +34,7 @@ from folders import cached
 from clvol.accel.bvh import Bvh, build_bvh
 from clvol.device import programs
 from clvol.device.device import Device, open_device
+from clvol.device.launch import run_kernel
 
 REQUIREMENT = "embreex"
 SIZES = (70_000, 1_000_000)
@@ -43,10 +44,12 @@ AGREE_TARGET = 0.999
 """Share of the rays that must hit the same triangle on both sides; those along edges may go to either."""
 KERNEL = """
 __kernel void trace(__global const float8 *nodes, __global const float8 *triangles, __global const float *o,
-                    __global const float *d, __global uint *primitive)
+                    __global const float *d, __global uint *primitive, uint count)
 {
     const Scene scene = {nodes, triangles};
     const size_t i = get_global_id(0);
+    if (i >= count)
+        return;
     const Ray ray = {vload3(i, o), vload3(i, d)};
     primitive[i] = closest_hit(&scene, ray, 0.0f, NO_PRIMITIVE, INFINITY).primitive;
 }
@@ -104,18 +107,14 @@ class OurSide:
         text = programs.expand('#include "geometry/bvh.h"\n' + KERNEL, flags, {}, scene)
         self.device = device
         self.kernel = cl.Kernel(programs.build(device, text, "rays"), "trace")
-        self.tree = [self.buffer(bvh.nodes), self.buffer(bvh.packets)]
-
-    def buffer(self, array: np.ndarray) -> cl.Buffer:
-        flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
-        return cl.Buffer(self.device.context, flags, hostbuf=array)
+        self.tree = [device.memory.upload(array, "the hierarchy") for array in (bvh.nodes, bvh.packets)]
 
     def trace(self, o: np.ndarray, d: np.ndarray) -> tuple[float, np.ndarray]:
         """Seconds, and the primitives hit, int32 (rays,), -1 for none."""
         primitive = np.empty(len(o), np.int32)
-        arrays = [self.buffer(a) for a in (o, d, primitive)]
-        event = self.kernel(self.device.queue, (len(o),), (64,), *self.tree, *arrays)
-        cl.enqueue_copy(self.device.queue, primitive, arrays[2], is_blocking=True)
+        event = run_kernel(
+            self.device, self.kernel, len(o), self.tree, [o, d], [primitive], [np.uint32(len(o))]
+        )
         return 1e-9 * (event.profile.end - event.profile.start), primitive
 
 

@@ -7,7 +7,6 @@ import shutil
 import subprocess
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from typing import Any
 
 import pyopencl as cl
 
@@ -69,15 +68,6 @@ class Device:
             largest=int(device.max_mem_alloc_size),
             shared=bool(device.host_unified_memory),
         )
-
-
-def set_arguments(kernel: cl.Kernel, *values: Any) -> None:
-    """Bind every argument of a kernel.
-
-    One by one: pyopencl's own call for all goes through a cache in the user's home, which may be damaged.
-    """
-    for number, value in enumerate(values):
-        kernel.set_arg(number, value)
 
 
 @dataclass(eq=False)

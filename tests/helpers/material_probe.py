@@ -5,6 +5,7 @@ import pyopencl as cl
 
 from clvol import layout
 from clvol.device import programs
+from clvol.device.launch import run_kernel
 from clvol.scene import bsdf, texture
 from clvol.scene.library import Library
 from clvol.scene.nodes import from_dict
@@ -113,21 +114,14 @@ class MaterialProbe:
         kinds = set(layout.BSDFS) if kinds is None else set(kinds)
         self.program = programs.build(device, source(kinds, channel), "material probe")
         self.scene = [
-            self._buffer(array if array.size else np.zeros(64, np.float32))
+            device.memory.upload(array if array.size else np.zeros(64, np.float32), "")
             for array in (self.table.materials, self.table.textures, self.table.texels, self.table.tables)
         ]
 
-    def _buffer(self, array):
-        flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
-        return cl.Buffer(self.device.context, flags, hostbuf=np.ascontiguousarray(array))
-
     def _run(self, name, width, count, *arrays):
         out = np.zeros((count, width), np.float32)
-        buffers = [self._buffer(array) for array in (*arrays, out)]
         kernel = cl.Kernel(self.program, name)
-        size = (-(-count // 64) * 64,)
-        kernel(self.device.queue, size, (64,), *self.scene, *buffers, np.uint32(count))
-        cl.enqueue_copy(self.device.queue, out, buffers[-1], is_blocking=True)
+        run_kernel(self.device, kernel, count, self.scene, arrays, [out], [np.uint32(count)])
         return out
 
     def sample(self, material, wi, random, uv=(0.5, 0.5)):

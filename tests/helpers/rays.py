@@ -8,6 +8,7 @@ import pyopencl as cl
 from clvol import layout
 from clvol.accel.bvh import NO_PRIMITIVE, build_bvh
 from clvol.device import programs
+from clvol.device.launch import run_kernel
 
 NO_BOXES = np.empty((0, 2, 3), np.float32)
 NO_FACES = np.empty((0, 3), np.int32)
@@ -85,19 +86,12 @@ class Caster:
         source = ray_source(-(-self.bvh.stack // 64) * 64, len(faces) > 0, len(boxes) > 0)
         self.program = programs.build(device, source, "rays")
         records = np.zeros(1, layout.QUADRIC) if quadrics is None else quadrics
-        self.scene = [self._buffer(a) for a in (self.bvh.nodes, self.bvh.packets, records)]
-
-    def _buffer(self, array):
-        flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
-        return cl.Buffer(self.device.context, flags, hostbuf=array)
+        self.scene = [device.memory.upload(a, "") for a in (self.bvh.nodes, self.bvh.packets, records)]
 
     def _run(self, name, o, d, inputs, outputs):
-        arrays = [np.ascontiguousarray(a, np.float32) for a in (o, d)] + [*inputs, *outputs]
-        buffers = [self._buffer(a) for a in arrays]
+        arrays = [np.ascontiguousarray(a, np.float32) for a in (o, d)] + inputs
         # PoCL compiles a kernel anew for every local size
-        cl.Kernel(self.program, name)(self.device.queue, (len(o),), (1,), *self.scene, *buffers)
-        for array, buffer in zip(outputs, buffers[-len(outputs) :], strict=True):
-            cl.enqueue_copy(self.device.queue, array, buffer, is_blocking=True)
+        run_kernel(self.device, cl.Kernel(self.program, name), len(o), self.scene, arrays, outputs, group=1)
 
     def closest(self, o, d, t_max=np.inf, after_t=0.0, after_primitive=NO_PRIMITIVE):
         """First hits after (after_t, after_primitive), numbers or arrays."""

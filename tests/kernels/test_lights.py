@@ -15,6 +15,7 @@ from stat_tests import FALSE_ALARM, chi2_p_value, largest_z, sidak, z_score
 
 from clvol import layout, rotate, scale, translate
 from clvol.device import programs
+from clvol.device.launch import run_kernel
 from clvol.scene.records import (
     ConstantEmitter,
     DirectionalEmitter,
@@ -195,13 +196,9 @@ class World:
         """Output (count, columns), float64, of one kernel."""
         kernel = cl.Kernel(programs.build(self.device, source(), "lights"), f"{name}_kernel")
         out = np.zeros((count, columns), np.float32)
-        flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
-        context = self.device.context
         arrays = [a if a.size else np.zeros(64, np.uint8) for a in self.buffers]
-        arrays += [np.ascontiguousarray(inputs, np.float32), out]
-        buffers = [cl.Buffer(context, flags, hostbuf=a) for a in arrays]
-        kernel(self.device.queue, (count,), None, *buffers)
-        cl.enqueue_copy(self.device.queue, out, buffers[-1], is_blocking=True)
+        arrays.append(np.ascontiguousarray(inputs, np.float32))
+        run_kernel(self.device, kernel, count, [], arrays, [out], group=1)
         return out.astype(float)
 
     def sample(self, point, draws=DRAWS):

@@ -1,0 +1,71 @@
+"""How kernels are given their arguments, launched and read."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pyopencl as cl
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+
+    from clvol.device.device import Device
+
+GROUP = 64
+"""Work-items of a group, where a kernel has no wish of its own."""
+
+
+def set_arguments(kernel: cl.Kernel, *values: Any) -> None:
+    """Bind every argument of a kernel.
+
+    One by one: pyopencl's own call for all goes through a cache in the user's home, which may be damaged.
+    """
+    for number, value in enumerate(values):
+        kernel.set_arg(number, value)
+
+
+def launch(device: Device, kernel: cl.Kernel, count: int, group: int = GROUP) -> cl.Event:
+    """Queue a kernel for `count` work-items or, where they do not fill the last group, a few more."""
+    size = -(-count // group) * group
+    return cl.enqueue_nd_range_kernel(device.queue, kernel, (size,), (group,))
+
+
+def run_kernel(
+    device: Device,
+    kernel: cl.Kernel,
+    count: int,
+    resident: Sequence[Any],
+    inputs: Sequence[np.ndarray],
+    outputs: Sequence[np.ndarray],
+    scalars: Sequence[Any] = (),
+    group: int = GROUP,
+    purpose: tuple[str, str] = ("the arrays of a kernel", ""),
+) -> cl.Event:
+    """Run a kernel once on arrays of the host.
+
+    Parameters
+    ----------
+    resident
+        Its first arguments: buffers that are on the device, and scalars.
+    inputs, outputs
+        Arrays, its next arguments.  All go in, and `outputs`, which are contiguous, come back in place.
+    scalars
+        NumPy scalars, its last arguments.
+    purpose
+        What the arrays are for, and what helps where there is no room for them.
+
+    Returns
+    -------
+    pyopencl.Event
+        The kernel has run.
+    """
+    buffers = [device.memory.upload(array, *purpose) for array in (*inputs, *outputs)]
+    set_arguments(kernel, *resident, *buffers, *scalars)
+    event = launch(device, kernel, count, group)
+    for host, buffer in zip(outputs, buffers[len(inputs) :], strict=True):
+        if host.size:
+            cl.enqueue_copy(device.queue, host, buffer, is_blocking=True)
+    event.wait()
+    return event
