@@ -17,7 +17,8 @@ import numpy as np
 import pyopencl as cl
 
 from clvol import layout
-from clvol.device.device import Device, set_arguments
+from clvol.device.device import Device
+from clvol.device.launch import set_arguments
 from clvol.errors import OptionError
 from clvol.planning.plan import Plan
 from clvol.rendering.film import Film

@@ -19,7 +19,7 @@ from clvol.cli.main import main
 from clvol.device import programs
 from clvol.errors import OptionError
 from clvol.lab.ray.plot import draw
-from clvol.lab.ray.walks import read_walk
+from clvol.lab.ray.walks import OUTCOME, read_walk
 from clvol.planning import registry
 from clvol.scene.records import ConstVolume, Medium
 
@@ -88,9 +88,10 @@ def middles(view):
     return (view.edges[1:] + view.edges[:-1]) / 2
 
 
-def cell_values(watched, column, t):
-    """A column of the majorant's cells at t."""
-    return watched.cells[np.minimum(np.searchsorted(watched.cells[:, 1], t), len(watched.cells) - 1), column]
+def cell_values(watched, name, t):
+    """What the majorant's cells have at t."""
+    cells = watched.cells
+    return cells[name][np.minimum(np.searchsorted(cells["t_end"], t), len(cells) - 1)]
 
 
 def test_the_density_along_the_ray_is_that_of_the_volume(view, chromatic):
@@ -107,15 +108,15 @@ def test_majorants_bound_the_density_and_controls_lie_between(view, chromatic):
     for one, channels in [(w, 1) for w in view.watched] + [(w, 3) for w in chromatic.watched]:
         cells, t = one.cells, middles(view if channels == 1 else chromatic)
         sigma_t = (view if channels == 1 else chromatic).sigma_t
-        assert cells[0, 0] == 0
-        np.testing.assert_array_equal(cells[1:, 0], cells[:-1, 1])
-        assert cells[-1, 1] == pytest.approx(t[-1], rel=1e-3)
-        assert (cell_values(one, 2, t) >= sigma_t.max(axis=0)).all()
+        assert cells["t"][0] == 0
+        np.testing.assert_array_equal(cells["t"][1:], cells["t_end"][:-1])
+        assert cells["t_end"][-1] == pytest.approx(t[-1], rel=1e-3)
+        assert (cell_values(one, "majorant", t) >= sigma_t.max(axis=0)).all()
         control = one.control(0)
         if one.name == "decomposition":
-            assert (cell_values(one, 3, t) <= sigma_t[0]).all()
+            assert (cell_values(one, "control", t)[:, 0] <= sigma_t[0]).all()
         if control is not None:
-            assert (control >= 0).all() and (control <= cells[:, 2]).all()
+            assert (control >= 0).all() and (control <= cells["majorant"]).all()
     named = {(w.family, w.name): w for w in view.watched}
     assert {name for (_, name), w in named.items() if w.control(0) is not None} == {
         "decomposition",
@@ -123,8 +124,8 @@ def test_majorants_bound_the_density_and_controls_lie_between(view, chromatic):
         "residual-ratio",
     }
     residual = named["transmittance", "residual-ratio"]
-    spread = np.abs(cell_values(residual, 6, middles(view)) - view.sigma_t[0])
-    assert (spread <= cell_values(residual, 9, middles(view))).all()
+    spread = np.abs(cell_values(residual, "residual_control", middles(view))[:, 0] - view.sigma_t[0])
+    assert (spread <= cell_values(residual, "residual_rate", middles(view))).all()
 
 
 def test_recorded_events_are_all_that_the_walks_counted(view, chromatic):
@@ -132,11 +133,11 @@ def test_recorded_events_are_all_that_the_walks_counted(view, chromatic):
     for one in (*view.watched, *chromatic.watched):
         for walk, outcome in zip(one.walks, one.outcomes, strict=False):
             assert not walk.truncated
-            assert len(walk.lookups) == outcome[6]
+            assert len(walk.lookups) == outcome["lookups"]
             if one.name != "regular":
-                assert len(walk.collisions) == outcome[4]
-            assert sum(c.kind != "null" for c in walk.collisions) == outcome[5]
-            assert outcome[7] == 0
+                assert len(walk.collisions) == outcome["tentative"]
+            assert sum(c.kind != "null" for c in walk.collisions) == outcome["real"]
+            assert outcome["flaws"] == 0
 
 
 def test_collisions_know_the_density_and_the_rate_where_they_are(view, chromatic):
@@ -144,9 +145,9 @@ def test_collisions_know_the_density_and_the_rate_where_they_are(view, chromatic
         for one in shown.watched:
             if one.rate() is None:
                 continue
-            column = 9 if one.name == "residual-ratio" else 2
+            name = "residual_rate" if one.name == "residual-ratio" else "majorant"
             for collision in (c for walk in one.walks for c in walk.collisions):
-                near = cell_values(one, column, collision.t + np.array([-1e-5, 0.0, 1e-5]))
+                near = cell_values(one, name, collision.t + np.array([-1e-5, 0.0, 1e-5]))
                 assert (collision.rate == near.astype(np.float32)).any()
                 if collision.sigma_t is not None:
                     for channel, values in enumerate(shown.sigma_t):
@@ -243,14 +244,14 @@ def test_a_walk_is_the_same_unwatched(device):
     """
     out = np.empty(500, np.float32), np.empty(500, np.float32)
     t, weights = probe.run(headers_of(probe.plan, "technique"), body, out, [np.array(given, np.float32)])
-    np.testing.assert_array_equal(t, watched.watched[0].outcomes[:, 0])
-    np.testing.assert_array_equal(weights, watched.watched[0].outcomes[:, 1])
+    np.testing.assert_array_equal(t, watched.watched[0].outcomes["t"])
+    np.testing.assert_array_equal(weights, watched.watched[0].outcomes["value"][:, 0])
     for stage in probe.plan.stages:
         assert "Recorder" not in programs.stage_source(probe.plan, stage)
 
 
 def test_a_log_too_short_for_a_walk_says_so():
-    outcome = np.array([0.5, 1, 1, 1, 3, 1, 3, 0, 7], np.float32)
+    outcome = np.array((0.5, (1, 1, 1), 3, 1, 3, 0, 7), OUTCOME)
     events = np.array([[0, 0.1, 2, 2, 2], [1, 0.1, 1, 1, 1]], np.float32)
     walk = read_walk(outcome, events)
     assert walk.truncated and walk.collisions[0].kind == "null" and walk.collisions[0].sigma_t == (1, 1, 1)

@@ -15,7 +15,9 @@ import pyopencl as cl
 
 from clvol import layout
 from clvol.device import programs
-from clvol.device.device import Device, set_arguments
+from clvol.device.device import Device
+from clvol.device.launch import set_arguments
+from clvol.lab.ray.walks import CELL, OUTCOME
 from clvol.planning import registry
 from clvol.planning.choices import Choices
 from clvol.planning.plan import Plan
@@ -25,8 +27,8 @@ from clvol.scene.records import Scene
 from clvol.tables.prepare import PreparedScene, prepare
 
 GROUP = 64
-OUTCOME_SIZE, EVENT_SIZE, CELL_SIZE = 9, 5, 10
-"""Floats of the records that cl/ray/*.cl write."""
+EVENT_SIZE = 5
+"""Floats of an event, as cl/ray/recorder.h writes it."""
 MOST_EVENTS = 4096
 """Events of a walk that are recorded; later ones are only counted."""
 MOST_CELLS = 1 << 16
@@ -67,8 +69,8 @@ class RayKernels:
     def tables(
         self, given: np.ndarray, family: str | None, points: int
     ) -> tuple[np.ndarray, np.ndarray | None]:
-        """sigma_t at even steps of a ray, float32 (channels, points), and the cells of the majorant, float32
-        (n, CELL_SIZE), None where `family` walks none or is None."""
+        """sigma_t at even steps of a ray, float32 (channels, points), and the cells of the majorant,
+        `CELL` (n,), None where `family` walks none or is None."""
         channels = 3 if self.plan.features.chromatic_extinction else 1
         walks = family is not None and self._tracker(family).walks_majorant
         macros = {
@@ -77,22 +79,22 @@ class RayKernels:
             "CLVOL_RAY_RESIDUALS": family == "transmittance" and self.plan.needs_residuals,
         }
         sigma = np.empty((channels, points), np.float32)
-        cells, count = np.full((MOST_CELLS, CELL_SIZE), np.nan, np.float32), np.zeros(1, np.uint32)
+        cells, count = np.full((MOST_CELLS, CELL.itemsize // 4), np.nan, np.float32), np.zeros(1, np.uint32)
         sizes = [np.uint32(n) for n in (points, channels, MOST_CELLS)]
         self._run(points, "tables", macros, [given], [sigma, cells, count], sizes)
-        return sigma, cells[: int(count[0])].copy() if walks else None
+        return sigma, cells[: int(count[0])].view(CELL)[:, 0].copy() if walks else None
 
     def walks(
         self, given: np.ndarray, family: str, seed: int, walks: int, recorded: int
     ) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Outcomes of walks, float32 (walks, OUTCOME_SIZE), and events of the first, each (n, EVENT_SIZE)."""
-        outcomes = np.empty((walks, OUTCOME_SIZE), np.float32)
+        """Outcomes of walks, `OUTCOME` (walks,), and events of the first, each (n, EVENT_SIZE)."""
+        outcomes = np.empty(walks, OUTCOME)
         log = np.zeros((recorded, MOST_EVENTS, EVENT_SIZE), np.float32)
         macros = {"CLVOL_RAY_COLLISIONS": family == "technique"}
         sizes = [np.uint32(n) for n in (walks, recorded, MOST_EVENTS)]
         seeds = cl.cltypes.make_uint2(*seed_words(seed))
         self._run(walks, "walks", macros, [given], [outcomes, log], [seeds, *sizes])
-        return outcomes, [events[: int(o[-1])] for events, o in zip(log, outcomes, strict=False)]
+        return outcomes, [events[: int(o["events"])] for events, o in zip(log, outcomes, strict=False)]
 
     def _tracker(self, family: str) -> registry.Choice:
         return self.plan.tracker if family == "technique" else self.plan.estimator

@@ -217,8 +217,8 @@ def _watch(
     _, cells = kernels.tables(given, family if heterogeneous else None, 1)
     outcomes, events = kernels.walks(given, family, seed, many, shown)
     name = plan.chosen[family]
-    if outcomes[:, 7].any():
-        flawed = int((outcomes[:, 7] > 0).sum())
+    if outcomes["flaws"].any():
+        flawed = int((outcomes["flaws"] > 0).sum())
         log.warning(
             "%s: %d of %d walks met a density above the majorant, or were given up", name, flawed, many
         )
@@ -229,7 +229,7 @@ def _watch(
         name if heterogeneous else "analytic",
         plan.chosen["majorant"] if cells is not None else "none",
         biased,
-        None if cells is None else cells.astype(np.float64),
+        cells,
         outcomes,
         walks,
     )

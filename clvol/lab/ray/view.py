@@ -41,9 +41,10 @@ class RayView(WatchedRay):
         ]
         for watched in self.watched:
             mean, error = watched.transmitted(self.channel)
+            lookups, tentative = watched.mean("lookups"), watched.mean("tentative")
             lines.append(
-                f"  {watched.label}: transmittance {format_estimate(mean, error)}, {watched.mean(6):.4g} "
-                f"look-ups and {watched.mean(4):.4g} tentative collisions per walk"
+                f"  {watched.label}: transmittance {format_estimate(mean, error)}, "
+                f"{lookups:.4g} look-ups and {tentative:.4g} tentative collisions per walk"
             )
         return lines + [f"  {note}" for note in self.notes]
 
@@ -68,7 +69,7 @@ class RayView(WatchedRay):
     def _watched_dict(self, watched: Watched) -> dict[str, Any]:
         cells = watched.cells
         names = ("t", "t_end", "majorant")
-        known = {} if cells is None else {name: cells[:, n].tolist() for n, name in enumerate(names)}
+        known = {} if cells is None else {name: cells[name].tolist() for name in names}
         for name, values in (("rate", watched.rate()), ("control", watched.control(self.channel))):
             if values is not None:
                 known[name] = values.tolist()
@@ -82,8 +83,8 @@ class RayView(WatchedRay):
             "walks": len(watched.outcomes),
             "transmittance": mean,
             "standard_error": error,
-            "lookups": watched.mean(6),
-            "tentative": watched.mean(4),
+            "lookups": watched.mean("lookups"),
+            "tentative": watched.mean("tentative"),
             "shown": [asdict(walk) for walk in watched.walks],
         }
 

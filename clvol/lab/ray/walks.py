@@ -9,6 +9,29 @@ import numpy as np
 
 TENTATIVE, LOOKUP, NULL, REAL, ESTIMATE = range(5)
 """Kinds of events, as cl/ray/recorder.h numbers them."""
+OUTCOME = np.dtype(
+    [
+        ("t", "f4"),  # of the real collision; -1 where it left the medium
+        ("value", "f4", 3),  # weight of a technique's walk, or estimate of transmittance, by channel
+        ("tentative", "f4"),
+        ("real", "f4"),
+        ("lookups", "f4"),
+        ("flaws", "f4"),  # violations of the bound, and whether it was given up
+        ("events", "f4"),
+    ]
+)
+"""A walk's outcome, as cl/ray/walks.cl writes it; numbers but for t and value are counts."""
+CELL = np.dtype(
+    [
+        ("t", "f4"),
+        ("t_end", "f4"),
+        ("majorant", "f4"),
+        ("control", "f4", 3),
+        ("residual_control", "f4", 3),
+        ("residual_rate", "f4"),
+    ]
+)
+"""A cell of the majorant along the ray, as cl/ray/tables.cl writes it; nan for what the walk does not use."""
 UNNAMED = "the medium"
 """What a medium without a name is called."""
 
@@ -60,10 +83,10 @@ class Walk:
         return None
 
 
-def read_walk(outcome: np.ndarray, events: np.ndarray) -> Walk:
-    """A walk from its outcome and its log, float32 (9,) and (n, 5), as cl/ray/walks.cl writes them."""
-    t, *value = (float(v) for v in outcome[:4])
-    walk = Walk(t if t >= 0 else None, tuple(value), truncated=bool(len(events) < outcome[8]))
+def read_walk(outcome: np.void | np.ndarray, events: np.ndarray) -> Walk:
+    """A walk from its `OUTCOME` and its log, float32 (n, 5), as cl/ray/walks.cl writes them."""
+    t, value = float(outcome["t"]), tuple(outcome["value"].tolist())
+    walk = Walk(t if t >= 0 else None, value, truncated=bool(len(events) < outcome["events"]))
     open_collision: Collision | None = None
     for kind, t, *numbers in events.tolist():
         numbers = tuple(numbers)
@@ -84,7 +107,7 @@ def read_walk(outcome: np.ndarray, events: np.ndarray) -> Walk:
             walk.weights.append((t, numbers))
         else:
             walk.estimates.append((t, numbers))
-    if outcome[5] > 0 and walk.end is None and walk.collisions:
+    if outcome["real"] > 0 and walk.end is None and walk.collisions:
         walk.collisions[-1].kind = "real"  # ends an all-or-nothing estimate
     return walk
 
@@ -95,9 +118,8 @@ class Watched:
 
     family, name : of `clvol.planning.registry`; the name "analytic" stands for the closed forms of
         homogeneous media.
-    cells : float64 (n, 10) of the majorant it walks: t, t_end, majorant, control (3), control (3) and rate of
-        residual ratio tracking; None where it walks none.
-    outcomes : float32 (walks, 9): t or -1; weight or estimate (3); tentative, real, look-ups, flaws, events.
+    cells : `CELL` (n,) of the majorant it walks; None where it walks none.
+    outcomes : `OUTCOME` (walks,).
     walks : the first of them, event by event.
     """
 
@@ -114,37 +136,38 @@ class Watched:
         """Its name, and that it is biased where it is."""
         return f"{self.name} (biased)" if self.biased else self.name
 
-    def mean(self, column: int) -> float:
-        """Mean of a column of the outcomes."""
-        return float(self.outcomes[:, column].mean(dtype=np.float64))
+    def mean(self, count: str) -> float:
+        """Mean over the walks of one of the counts of `OUTCOME`."""
+        return float(self.outcomes[count].mean(dtype=np.float64))
 
     def control(self, channel: int) -> np.ndarray | None:
         """What it subtracts in each cell, (n,), or None."""
         if self.cells is None:
             return None
-        values = self.cells[:, (6 if self.family == "transmittance" else 3) + channel]
+        name = "residual_control" if self.family == "transmittance" else "control"
+        values = self.cells[name][:, channel].astype(np.float64)
         return None if np.isnan(values).all() else values
 
     def rate(self) -> np.ndarray | None:
         """Rate of its tentative collisions in each cell, (n,), or None where it has none."""
         if self.cells is None or self.name == "regular":
             return None
-        rate = self.cells[:, 9]
-        return self.cells[:, 2] if np.isnan(rate).all() else rate
+        rate = self.cells["residual_rate"].astype(np.float64)
+        return self.cells["majorant"].astype(np.float64) if np.isnan(rate).all() else rate
 
     def transmitted(self, channel: int) -> tuple[float, float]:
         """Its estimate of the part's transmittance and its standard error: means, or weights that left."""
-        values = self.outcomes[:, 1 + channel].astype(np.float64)
+        values = self.outcomes["value"][:, channel].astype(np.float64)
         if self.family == "technique":
-            values = np.where(self.outcomes[:, 0] < 0, values, 0.0)
+            values = np.where(self.outcomes["t"] < 0, values, 0.0)
         return float(values.mean()), float(values.std(ddof=1) / math.sqrt(len(values)))
 
     def free_path_density(self, edges: np.ndarray, channel: int) -> tuple[np.ndarray, np.ndarray]:
         """Density of free paths between `edges`, weighted, and its standard error, float64 (bins,)."""
         count, bins = len(self.outcomes), len(edges) - 1
-        t = self.outcomes[:, 0].astype(np.float64)
+        t = self.outcomes["t"].astype(np.float64)
         hit = (t >= edges[0]) & (t <= edges[-1])  # those that go further count as walks, not as collisions
-        weights = self.outcomes[hit, 1 + channel].astype(np.float64)
+        weights = self.outcomes["value"][hit, channel].astype(np.float64)
         place = np.minimum(np.searchsorted(edges, t[hit], side="right") - 1, bins - 1)
         mean = np.bincount(place, weights, bins) / count
         square = np.bincount(place, weights**2, bins) / count
@@ -156,8 +179,9 @@ class Watched:
         control = self.control(channel)
         if control is None:
             return np.zeros_like(edges)
-        ends = np.concatenate([[0.0], self.cells[:, 1]])
-        depth = np.concatenate([[0.0], np.cumsum(control * (self.cells[:, 1] - self.cells[:, 0]))])
+        starts, ends = (self.cells[name].astype(np.float64) for name in ("t", "t_end"))
+        depth = np.concatenate([[0.0], np.cumsum(control * (ends - starts))])
+        ends = np.concatenate([[0.0], ends])
         return np.interp(edges, ends, depth)
 
     def running_estimate(self, walk: Walk, edges: np.ndarray, channel: int) -> np.ndarray:

@@ -94,7 +94,7 @@ def _draw_medium(axes: Axes, view: WatchedRay, watched: Watched) -> None:
     top = sigma.max()
     for values, how in ((watched.rate(), MAJORANT), (watched.control(view.channel), CONTROL)):
         if values is not None:
-            planes = start + np.append(watched.cells[:, 0], watched.cells[-1, 1])
+            planes = start + np.append(watched.cells["t"], watched.cells["t_end"][-1]).astype(np.float64)
             axes.stairs(values, planes, baseline=None, **how)
             top = max(top, values.max())
     axes.set_ylim(0, 1.08 * min(top, 8 * sigma.max()))

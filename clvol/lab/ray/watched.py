@@ -60,7 +60,7 @@ class WatchedRay:
         first, last = self.edges[matter[0]], self.edges[matter[-1] + 1]
         for watched in self.watched:
             if watched.rate() is not None:
-                first = min(first, *watched.cells[watched.rate() > 0, 0].tolist())
+                first = min(first, *watched.cells["t"][watched.rate() > 0].tolist())
         dark = np.flatnonzero(self.transmittance[self.channel] < DARK)
         if len(dark):
             ends = [walk.reach(self.channel) for watched in self.watched for walk in watched.walks]
@@ -88,8 +88,8 @@ class WatchedRay:
             if watched.rate() is None or watched.name == "residual-ratio" or not len(others):
                 continue
             cells = watched.cells
-            place = np.minimum(np.searchsorted(cells[:, 1], middles), len(cells) - 1)
-            inside = (middles >= cells[0, 0]) & (middles <= cells[-1, 1])
+            place = np.minimum(np.searchsorted(cells["t_end"], middles), len(cells) - 1)
+            inside = (middles >= cells["t"][0]) & (middles <= cells["t_end"][-1])
             if (inside & (others > 1.001 * watched.rate()[place])).any():
                 exceeded.append(watched.label)
         if not exceeded:
