@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from clvol.lab.comparison import Comparison, compare
     from clvol.lab.ray.trace import trace_ray
     from clvol.lab.ray.view import RayView
-    from clvol.lab.selftest import SelfTest, selftest
+    from clvol.lab.selftest import selftest
+    from clvol.lab.verdict import SelfTest
     from clvol.picture.merging import merge
     from clvol.picture.result import Result
     from clvol.scene import load_dict, load_file, look_at, rotate, scale, translate
@@ -63,7 +64,8 @@ _MODULES = {
     "clvol.lab.comparison": ["Comparison", "compare"],
     "clvol.lab.ray.trace": ["trace_ray"],
     "clvol.lab.ray.view": ["RayView"],
-    "clvol.lab.selftest": ["SelfTest", "selftest"],
+    "clvol.lab.selftest": ["selftest"],
+    "clvol.lab.verdict": ["SelfTest"],
     "clvol.picture.merging": ["merge"],
     "clvol.picture.result": ["Result"],
     "clvol.scene": ["load_dict", "load_file", "look_at", "rotate", "scale", "translate"],

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.progress import TaskID
 
     from clvol.lab.judgement import Tested
-    from clvol.lab.selftest import SelfTest
+    from clvol.lab.verdict import SelfTest
 
 EXAMPLES = """
 \b

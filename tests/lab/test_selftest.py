@@ -22,8 +22,8 @@ from clvol.lab.combinations import KEYS, covering, in_force, unbiased, usable
 from clvol.lab.judgement import judge
 from clvol.lab.reduced import reduced
 from clvol.lab.seeds import independent_seeds
-from clvol.lab.selftest import SelfTest
 from clvol.lab.trials import rounds
+from clvol.lab.verdict import SelfTest
 from clvol.planning.plan import Plan
 from clvol.planning.registry import FAMILIES
 from clvol.scene.records import ConstantEmitter, DirectionalEmitter, Film
