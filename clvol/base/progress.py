@@ -13,7 +13,7 @@ from typing import IO, TYPE_CHECKING, Any, cast
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress as RichBar
-    from rich.progress import TaskID
+    from rich.progress import ProgressColumn, TaskID
 
 
 _READING_PACE = 20.0
@@ -152,6 +152,13 @@ def error_console() -> Console:
     return Console(file=cast("IO[str]", _Lasting()))
 
 
+def bar_of(console: Console, *columns: ProgressColumn) -> RichBar:
+    """A bar of such columns, which leaves no trace when it is done; silent where `console` is no terminal."""
+    from rich.progress import Progress as RichBar
+
+    return RichBar(*columns, console=console, disable=not console.is_terminal, transient=True)
+
+
 class RichProgress:
     """Progress bar on standard error: samples done, time left and noise; silent where that is no terminal.
 
@@ -165,15 +172,12 @@ class RichProgress:
 
     def __enter__(self) -> RichProgress:
         from rich.progress import BarColumn, TextColumn
-        from rich.progress import Progress as RichBar
 
-        self._bar = RichBar(
+        self._bar = bar_of(
+            self.console,
             TextColumn("{task.description}"),
             BarColumn(),
             TextColumn("{task.fields[samples]}  {task.fields[left]} left  noise {task.fields[noise]}"),
-            console=self.console,
-            disable=not self.console.is_terminal,
-            transient=True,
         )
         self._task = self._bar.add_task("rendering", total=1.0, samples="0 spp", left="-", noise="unknown")
         self._bar.start()

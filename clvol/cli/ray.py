@@ -106,12 +106,11 @@ def _bar(quiet: bool) -> Iterator[Callable[[int, int, str], None] | None]:
     if quiet:
         yield None
         return
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 
-    from clvol.base.progress import error_console
+    from clvol.base.progress import bar_of, error_console
 
     columns = TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn()
-    console = error_console()
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    with bar_of(error_console(), *columns) as bar:
         task = bar.add_task("loading", total=None)
         yield lambda done, total, what: bar.update(task, completed=done, total=total, description=what)

@@ -100,10 +100,12 @@ class _Steps:
     """A progress bar with the time left on standard error; silent where that is no terminal."""
 
     def __init__(self, console: Console) -> None:
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+
+        from clvol.base.progress import bar_of
 
         columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-        self._bar = Progress(*columns, console=console, disable=not console.is_terminal, transient=True)
+        self._bar = bar_of(console, *columns)
         self._tasks: dict[str, TaskID] = {}
 
     def __enter__(self) -> _Steps:

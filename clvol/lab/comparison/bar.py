@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from clvol.base.progress import error_console, format_seconds
+from clvol.base.progress import bar_of, error_console, format_seconds
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -18,17 +18,14 @@ class Bar:
     """
 
     def __init__(self, console: Console | None = None) -> None:
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+        from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 
-        console = console or error_console()
-        self._bar = Progress(
+        self._bar = bar_of(
+            console or error_console(),
             TextColumn("{task.description}", markup=False),
             BarColumn(),
             TimeElapsedColumn(),
             TextColumn("{task.fields[left]}"),
-            console=console,
-            disable=not console.is_terminal,
-            transient=True,
         )
         self._task = self._bar.add_task("opening the scene", total=None, left="")
         self._began: float | None = None
