@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pyopencl as cl
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
+from clvol import layout
 
-    import numpy as np
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
 
     from clvol.device.device import Device
 
@@ -24,6 +25,26 @@ def set_arguments(kernel: cl.Kernel, *values: Any) -> None:
     """
     for number, value in enumerate(values):
         kernel.set_arg(number, value)
+
+
+def scene_arguments(
+    macros: Mapping[str, int],
+    buffers: Mapping[str, cl.Buffer],
+    slot_stride: int,
+    unused: cl.Buffer | None = None,
+) -> list[Any]:
+    """What every kernel of a plan takes first (CLVOL_ARGUMENTS), in order.
+
+    unused
+        Stands for buffers that are not there; None: KeyError.
+    """
+    found: list[Any] = []
+    for argument in layout.arguments(macros):
+        if argument.name == "slot_stride":
+            found.append(np.uint32(slot_stride))
+        else:
+            found.append(buffers[argument.name] if unused is None else buffers.get(argument.name, unused))
+    return found
 
 
 def launch(device: Device, kernel: cl.Kernel, count: int, group: int = GROUP) -> cl.Event:

@@ -12,10 +12,11 @@ import pyopencl as cl
 from clvol import layout
 from clvol.device.device import Device
 from clvol.layout import BRICK_SAMPLES
+from clvol.tables.affine import rows_3x4
 from clvol.tables.blackbody import blackbody_table
 from clvol.tables.lights import LightTable, emitter_order, envmap_arrays, light_table
 from clvol.tables.materials import material_table
-from clvol.tables.media import medium_table, phase_table, rows_3x4
+from clvol.tables.media import medium_table, phase_table
 from clvol.tables.pixel_filter import filter_cdf
 from clvol.tables.prepare import PreparedScene
 from clvol.tables.sobol import block_table

@@ -18,7 +18,7 @@ import pyopencl as cl
 
 from clvol import layout
 from clvol.device.device import Device
-from clvol.device.launch import set_arguments
+from clvol.device.launch import launch, scene_arguments, set_arguments
 from clvol.errors import OptionError
 from clvol.planning.plan import Plan
 from clvol.rendering.film import Film
@@ -121,10 +121,7 @@ class Wavefront:
         state[[f.name for f in self.fields].index("job")] = layout.NO_JOB
         self._write("state", state)
         self._write("control", np.zeros(_DONE + self.pool.ring_passes, np.uint32))
-        values = [
-            np.uint32(self.stride) if argument.name == "slot_stride" else self.buffers[argument.name]
-            for argument in layout.arguments(self.plan.macros)
-        ]
+        values = scene_arguments(self.plan.macros, self.buffers, self.stride)
         for stage in self.plan.stages:
             set_arguments(self.kernels[stage], *values)
         self.list_pixels(None)
@@ -284,14 +281,13 @@ class Wavefront:
 
         One wave is queued behind the one that runs, so that a batch that turns out long can be cut.
         """
-        queue, size = self.device.queue, (self.groups * self.plan.tuning.local_size,)
-        local = (self.plan.tuning.local_size,)
+        local = self.plan.tuning.local_size
         launched: list[list[cl.Event]] = []
         start = time.perf_counter()
         while len(launched) < waves:
             launched.append(
                 [
-                    cl.enqueue_nd_range_kernel(queue, self.kernels[stage], size, local)
+                    launch(self.device, self.kernels[stage], self.groups * local, local)
                     for stage in self.plan.stages
                 ]
             )
@@ -317,7 +313,7 @@ class Wavefront:
 
     def _accumulate(self, ring_pass: int, samples: int, first: int) -> None:
         """Add one finished pass, from sample `first` on, to the film and free its place in the ring."""
-        local, film = 64, self.film.buffers
+        film = self.film.buffers
         kernel = self.kernels["accumulate"]
         set_arguments(
             kernel,
@@ -334,8 +330,7 @@ class Wavefront:
             np.uint32(first),
             np.uint32(self.listed),
         )
-        size = -(-self.listed // local) * local
-        event = cl.enqueue_nd_range_kernel(self.device.queue, kernel, (size,), (local,))
+        event = launch(self.device, kernel, self.listed)
         event.wait()
         self.launches += 1
         self.seconds["accumulate"] += 1e-9 * (event.profile.end - event.profile.start)

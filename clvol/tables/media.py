@@ -12,8 +12,10 @@ from clvol.scene.boundaries import MediumEntry, entry_bounds, is_clipped
 from clvol.scene.medium_facts import bounding_kind, is_homogeneous
 from clvol.scene.phase import phase_lobes
 from clvol.scene.thinness import thin_media
+from clvol.tables.affine import centred, from_centred, rows_3x4
 from clvol.tables.apart import peak_extinction
 from clvol.tables.blackbody import blackbody_rgb
+from clvol.tables.colours import rgb
 
 if TYPE_CHECKING:
     from clvol.tables.prepare import PreparedScene
@@ -21,15 +23,6 @@ if TYPE_CHECKING:
 
 BOUND_SLACK = 1e-5
 """Share of its size by which a medium's world box exceeds the boundaries that hold it."""
-
-
-def rows_3x4(matrix: np.ndarray) -> np.ndarray:
-    """The affine part of a 4x4 matrix as 12 floats."""
-    return matrix[:3].astype(np.float32).reshape(12)
-
-
-def _rgb(value: tuple[float, ...]) -> np.ndarray:
-    return np.broadcast_to(np.asarray(value, np.float64), 3)
 
 
 def medium_table(prepared: PreparedScene) -> np.ndarray:
@@ -49,7 +42,7 @@ def medium_table(prepared: PreparedScene) -> np.ndarray:
         record["thin"] = int(is_thin)
         record["presence"] = int(entry.shape is not None or entry.everywhere)
         if entry.shape is not None:
-            record["shape_from_world"] = rows_3x4(_from_centred(entry.shape.to_world, prepared.centre))
+            record["shape_from_world"] = rows_3x4(from_centred(entry.shape.to_world, prepared.centre))
             record["shape_kind"] = layout.enum("SHAPE", bounding_kind(entry.shape))
         record["homogeneous"] = int(is_homogeneous(medium))
         record["clipped"] = int(is_clipped(medium))
@@ -63,18 +56,18 @@ def medium_table(prepared: PreparedScene) -> np.ndarray:
         record["sigma_t_volume"] = roles.get("sigma_t", -1)
         record["albedo_volume"] = roles.get("albedo", -1)
         if isinstance(medium.albedo, records.ConstVolume):
-            record["albedo"] = _rgb(medium.albedo.value)
+            record["albedo"] = rgb(medium.albedo.value)
         if isinstance(sigma_t, records.ConstVolume):
-            record["sigma_t"] = _rgb(sigma_t.value) * _rgb(medium.scale)
-            record["box_from_world"] = rows_3x4(_from_centred(sigma_t.to_world, prepared.centre))
+            record["sigma_t"] = rgb(sigma_t.value) * rgb(medium.scale)
+            record["box_from_world"] = rows_3x4(from_centred(sigma_t.to_world, prepared.centre))
             record["box_upper"] = 1.0
             if medium.homogeneous and entry.shape is None and not entry.everywhere:
                 _clip_to(record, box, prepared.centre)
             continue
         assert majorant is not None
         assert volume is not None
-        to_brick = volume.world_to_index @ _centred(sigma_t.index_to_world, prepared.centre)
-        record["sigma_t"] = _rgb(medium.scale)
+        to_brick = volume.world_to_index @ centred(sigma_t.index_to_world, prepared.centre)
+        record["sigma_t"] = rgb(medium.scale)
         record["box_from_world"] = rows_3x4(volume.world_to_index)
         record["box_lower"] = (to_brick @ [*sigma_t.lower, 1.0])[:3]
         record["box_upper"] = (to_brick @ [*sigma_t.upper, 1.0])[:3]
@@ -126,9 +119,9 @@ def mean_incident_radiance(scene: records.Scene) -> tuple[np.ndarray, np.ndarray
     for emitter in scene.emitters:
         match emitter:
             case records.ConstantEmitter():
-                sky += _rgb(emitter.radiance)
+                sky += rgb(emitter.radiance)
             case records.DirectionalEmitter():
-                suns += _rgb(emitter.irradiance) / (4 * np.pi)
+                suns += rgb(emitter.irradiance) / (4 * np.pi)
             case records.EnvmapEmitter():
                 rows = emitter.radiance.mean(axis=1, dtype=np.float64)
                 weights = np.sin(np.pi * np.arange(len(rows)) / max(len(rows) - 1, 1)) + 1e-9
@@ -154,7 +147,7 @@ def expected_albedo(medium: records.Medium) -> np.ndarray:
     """
     if not isinstance(medium.albedo, records.ConstVolume):
         return np.zeros(3)
-    s = np.sqrt(1.0 - _rgb(medium.albedo.value))
+    s = np.sqrt(1.0 - rgb(medium.albedo.value))
     return np.sqrt((1 - s) * (1 - 0.139 * s) / (1 + 1.17 * s))
 
 
@@ -164,22 +157,12 @@ def _emission(record: np.void, medium: records.Medium, roles: dict[str, int]) ->
     record["temperature_volume"] = roles.get("temperature", -1)
     if not medium.emits:
         return
-    radiance = _rgb(medium.emission_scale)
+    radiance = rgb(medium.emission_scale)
     if isinstance(medium.emission, records.ConstVolume):
-        radiance = radiance * _rgb(medium.emission.value)
+        radiance = radiance * rgb(medium.emission.value)
     if isinstance(medium.temperature, records.ConstVolume):
         kelvin = (medium.temperature.value[0] - medium.temperature_offset) * medium.temperature_scale
         radiance = radiance * blackbody_rgb(np.array([kelvin]))[0]
     record["emits"], record["emission"] = 1, radiance
     record["temperature_scale"] = medium.temperature_scale
     record["temperature_offset"] = medium.temperature_offset
-
-
-def _centred(to_world: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    matrix = to_world.copy()
-    matrix[:3, 3] -= centre
-    return matrix
-
-
-def _from_centred(to_world: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    return np.linalg.inv(_centred(to_world, centre))

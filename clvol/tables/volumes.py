@@ -10,6 +10,7 @@ from clvol.errors import SceneError
 from clvol.scene import records
 from clvol.scene.boundaries import is_clipped
 from clvol.scene.medium_facts import volume_roles
+from clvol.tables.affine import from_centred
 from clvol.volumes.bricks import BrickMap, BrickTree, build_bricks
 from clvol.volumes.grid import DenseGrid
 
@@ -30,11 +31,9 @@ def prepare_volume(volume: records.GridVolume, centre: np.ndarray) -> PreparedVo
         wrapped = np.pad(grid.values, [(1, 1), (1, 1), (1, 1), (0, 0)], mode="wrap")
         grid, shift = replace(grid, values=wrapped), np.full(3, -1.0)
     bricks = build_bricks(grid)
-    to_world = volume.index_to_world.copy()
-    to_world[:3, 3] -= centre
     to_brick = np.eye(4)
     to_brick[:3, 3] = -(np.array(bricks.origin) + shift)
-    return PreparedVolume(volume, bricks, to_brick @ np.linalg.inv(to_world))
+    return PreparedVolume(volume, bricks, to_brick @ from_centred(volume.index_to_world, centre))
 
 
 def check_cover(medium: records.Medium) -> None:

@@ -1,14 +1,12 @@
 """Runs single device functions: a tiny kernel round them, one work-item per number, on a real scene."""
 
 import numpy as np
-import pyopencl as cl
 
 from clvol import layout
-from clvol.device import programs
 from clvol.planning.choices import Choices
 from clvol.planning.plan import Plan
-from clvol.rendering.session import on_device, render_record
-from clvol.rendering.upload import upload_scene
+from clvol.rendering.scene_kernels import SceneKernels
+from clvol.rendering.session import on_device
 from clvol.scene.records import (
     ConstantEmitter,
     ConstVolume,
@@ -68,57 +66,38 @@ def medium_of(values, scale=1.0, albedo=0.0, **keywords):
     return Medium(grid_volume(values), ConstVolume((albedo,)), scale, homogeneous=False, **keywords)
 
 
-class Probe:
+class Probe(SceneKernels):
     """A scene on the device, and kernels of one line over it."""
 
     def __init__(self, device, scene, **choices):
-        self.device = device
         plan = Plan.of(scene, Choices(**({"majorant": "grid"} | choices)))
-        self.prepared = on_device(prepare(scene, plan), device)
-        self.plan = self.prepared.plan
-        self.upload()
+        super().__init__(device, on_device(prepare(scene, plan), device), seed=1)
 
     def upload(self, seed=1):
         """Write the prepared scene to the device (again)."""
-        device = self.device
-        self.buffers = upload_scene(device, self.prepared)
-        self.buffers["render"] = cl.Buffer(
-            device.context,
-            cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR,
-            hostbuf=render_record(self.prepared, seed),
-        )
+        super().upload(seed)
 
     def run(self, headers, body, outputs, inputs=(), stage=None):
-        """Run `body` for `outputs[0].size` work-items with index `i`; arrays are out0, …, in0, …
+        """Run `body` for `outputs[0].size` work-items with index `i`; arrays are in0, …, out0, …
 
         `stage` names the stage whose functions it calls, and whose contract holds.
         """
-        names = [(f"out{n}", a) for n, a in enumerate(outputs)] + [
-            (f"in{n}", a) for n, a in enumerate(inputs)
+        inputs = [np.ascontiguousarray(a) for a in inputs]
+        names = [(f"in{n}", a) for n, a in enumerate(inputs)] + [
+            (f"out{n}", a) for n, a in enumerate(outputs)
         ]
         c_types = {"f": "float", "u": "uint", "i": "int"}
         extra = "".join(f", __global {c_types[a.dtype.kind]} *{name}" for name, a in names)
-        source = programs.compose(
-            self.plan,
+        text = (
             "".join(
                 f'#include "{name}"\n' if name.endswith(".h") else f"#include {name}\n" for name in headers
             )
             + '#include "core/sampler.h"\n'
             f"__kernel void probe(CLVOL_ARGUMENTS{extra}, uint count)\n{{\n"
             "    const Scene scene_ = CLVOL_SCENE;\n    const Scene *scene = &scene_;\n"
-            f"    const uint i = get_global_id(0);\n    if (i >= count)\n        return;\n{body}\n}}\n",
-            stage=stage and layout.stage(stage),
+            f"    const uint i = get_global_id(0);\n    if (i >= count)\n        return;\n{body}\n}}\n"
         )
-        kernel = cl.Kernel(programs.build(self.device, source, "probe"), "probe")
-        flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
-        arrays = [cl.Buffer(self.device.context, flags, hostbuf=np.ascontiguousarray(a)) for _, a in names]
-        dummy = cl.Buffer(self.device.context, cl.mem_flags.READ_WRITE, 4)
-        scene = [
-            np.uint32(1) if a.name == "slot_stride" else self.buffers.get(a.name, dummy)
-            for a in layout.arguments(self.plan.macros)
-        ]
         count = outputs[0].shape[0]
-        kernel(self.device.queue, (-(-count // 64) * 64,), (64,), *scene, *arrays, np.uint32(count))
-        for (_, host), buffer in zip(names[: len(outputs)], arrays, strict=False):
-            cl.enqueue_copy(self.device.queue, host, buffer, is_blocking=True)
+        contract = stage and layout.stage(stage)
+        self.run_unit("probe", text, count, inputs, outputs, [np.uint32(count)], stage=contract)
         return outputs

@@ -7,26 +7,16 @@ What they run is the headers that the plan's own stages include, with hooks that
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pyopencl as cl
 
-from clvol import layout
-from clvol.device import programs
-from clvol.device.device import Device
-from clvol.device.launch import set_arguments
 from clvol.lab.ray.walks import CELL, OUTCOME
 from clvol.planning import registry
-from clvol.planning.choices import Choices
-from clvol.planning.plan import Plan
-from clvol.rendering.session import on_device, render_record, seed_words
-from clvol.rendering.upload import upload_scene
-from clvol.scene.records import Scene
-from clvol.tables.prepare import PreparedScene, prepare
+from clvol.rendering.scene_kernels import SceneKernels
+from clvol.rendering.session import seed_words
 
-GROUP = 64
 EVENT_SIZE = 5
 """Floats of an event, as cl/ray/recorder.h writes it."""
 MOST_EVENTS = 4096
@@ -34,26 +24,10 @@ MOST_EVENTS = 4096
 MOST_CELLS = 1 << 16
 
 
-@dataclass(eq=False)
-class RayKernels:
+class RayKernels(SceneKernels):
     """One scene on the device with one set of choices, and kernels along a ray."""
 
-    device: Device
-    prepared: PreparedScene
-    buffers: dict[str, cl.Buffer]
-
-    @classmethod
-    def open(cls, device: Device, scene: Scene, choices: Choices) -> RayKernels:
-        """Prepare and upload; OptionError for a combination that cannot be right."""
-        prepared = on_device(prepare(scene, Plan.of(scene, choices)), device)
-        buffers = upload_scene(device, prepared)
-        buffers["render"] = device.memory.upload(render_record(prepared, 0), "the camera")
-        return cls(device, prepared, buffers)
-
-    @property
-    def plan(self) -> Plan:
-        """What is compiled."""
-        return self.prepared.plan
+    purpose = "the walks", "watch fewer of them"
 
     def places(self, origin: np.ndarray, direction: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
         """Surfaces on a ray, float32 (n, 3): t, number, entering; and each medium's interval, float64
@@ -108,19 +82,7 @@ class RayKernels:
         outputs: list[np.ndarray],
         scalars: Sequence[Any],
     ) -> None:
-        """Run cl/ray/`name`.cl for `count` work-items; `outputs` go in and come back."""
+        """Run cl/ray/`name`.cl for `count` work-items; `outputs` come back."""
         flags = {macro: int(value) for macro, value in macros.items()}
-        source = programs.compose(self.plan, f'#include "ray/{name}.cl"\n', flags)
-        kernel = cl.Kernel(programs.build(self.device, source, f"ray/{name}"), name)
-        memory = self.device.memory
-        unused = memory.allocate(4, "an argument", "")
-        scene = [
-            np.uint32(1) if a.name == "slot_stride" else self.buffers.get(a.name, unused)
-            for a in layout.arguments(self.plan.macros)
-        ]
-        arrays = [memory.upload(array, "the walks", "watch fewer of them") for array in (*inputs, *outputs)]
-        set_arguments(kernel, *scene, *arrays, *scalars)
-        cl.enqueue_nd_range_kernel(self.device.queue, kernel, (-(-count // GROUP) * GROUP,), (GROUP,))
-        for host, buffer in zip(outputs, arrays[len(inputs) :], strict=True):
-            if host.size:
-                cl.enqueue_copy(self.device.queue, host, buffer, is_blocking=True)
+        text = f'#include "ray/{name}.cl"\n'
+        self.run_unit(name, text, count, inputs, outputs, scalars, flags)
