@@ -135,7 +135,7 @@ def _density(matter: Matter, one: _Walked) -> int:
 def _longest(one: _Walked) -> np.ndarray:
     """Optical depth of the longest way through the volume's box at density 1, float64 (channels,)."""
     bricks = one.volume.bricks
-    edges = np.linalg.inv(one.volume.world_to_index)[:3, :3] * bricks.size
+    edges = one.volume.edges * bricks.size
     scale = np.array(one.medium.scale, np.float64)
     own = scale if bricks.channels == len(scale) else scale.max()
     return np.broadcast_to(np.linalg.norm(edges) * own, bricks.channels)
@@ -165,7 +165,7 @@ def _as_sparse(bounds: AnyBounds) -> SparseBounds:
 
 
 def _candidate(one: _Walked, bounds: AnyBounds, kind: str, needs: MajorantNeeds) -> _Candidate:
-    extent = np.linalg.norm(np.linalg.inv(one.volume.world_to_index)[:3, :3], axis=0)
+    extent = one.volume.voxel
     rate, technique = float(np.max(one.medium.scale)), (needs.control, needs.scale)
     if kind == "kdtree":
         bounds = finest_lattice(bounds)

@@ -19,7 +19,6 @@ from clvol.tables.colours import rgb
 
 if TYPE_CHECKING:
     from clvol.tables.prepare import PreparedScene
-    from clvol.tables.volumes import PreparedVolume
 
 BOUND_SLACK = 1e-5
 """Share of its size by which a medium's world box exceeds the boundaries that hold it."""
@@ -71,7 +70,7 @@ def medium_table(prepared: PreparedScene) -> np.ndarray:
         record["box_from_world"] = rows_3x4(volume.world_to_index)
         record["box_lower"] = (to_brick @ [*sigma_t.lower, 1.0])[:3]
         record["box_upper"] = (to_brick @ [*sigma_t.upper, 1.0])[:3]
-        record["march_step"] = prepared.plan.choices.step or voxel_edges(volume).min()
+        record["march_step"] = prepared.plan.choices.step or volume.voxel.min()
         record["majorant"] = majorant.majorant.max()
         record["bound"] = max(record["majorant"], volume.bricks.peak.max())
         record["cells"], record["cell_size"] = majorant.cells, majorant.cell_size
@@ -99,12 +98,6 @@ def phase_table(entries: tuple[MediumEntry, ...]) -> np.ndarray:
         for p, share in phase_lobes(e.medium.phase)
     ]
     return np.array(lobes, layout.PHASE)
-
-
-def voxel_edges(volume: PreparedVolume) -> np.ndarray:
-    """World lengths of a voxel's edges, float64 (3,)."""
-    edges: np.ndarray = np.linalg.norm(np.linalg.inv(volume.world_to_index)[:3, :3], axis=0)
-    return edges
 
 
 def mean_incident_radiance(scene: records.Scene) -> tuple[np.ndarray, np.ndarray]:

@@ -23,6 +23,17 @@ class PreparedVolume:
     bricks: BrickMap | BrickTree
     world_to_index: np.ndarray
 
+    @property
+    def edges(self) -> np.ndarray:
+        """A voxel's edges in the world, the columns of a float64 (3, 3)."""
+        return np.linalg.inv(self.world_to_index)[:3, :3]
+
+    @property
+    def voxel(self) -> np.ndarray:
+        """World lengths of a voxel's edges, float64 (3,)."""
+        lengths: np.ndarray = np.linalg.norm(self.edges, axis=0)
+        return lengths
+
 
 def prepare_volume(volume: records.GridVolume, centre: np.ndarray) -> PreparedVolume:
     """Build a volume's bricks; `centre` is the world position that becomes the origin."""
