@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from pictures import assert_matches, ball, box, box_interval, camera_rays, hg, homogeneous
+from pictures import assert_matches, assert_pooled, ball, box, box_interval, camera_rays, hg, homogeneous
 from stat_tests import assert_same_picture, image_mean, largest_z
 from surface_scenes import (
     GLASS,
@@ -151,15 +151,7 @@ def test_media_are_where_their_boundaries_say(case):
 @pytest.mark.contract
 @pytest.mark.parametrize("where", ["outside", "inside"])
 def test_no_bias_is_shared_by_all_arrangements(where):
-    """The weighted mean of all pictures is right, and would not be if they were off by 0.5 %."""
-    found = [arrangement(*case) for case in CASES if case[1] == where]
-    means, variances = (np.array([image_mean(r)[k][0] for r, _ in found]) for k in (0, 1))
-    answers = np.array([answer.mean() for _, answer in found])
-    weights = answers**2 / variances
-    mean, error = np.average(means / answers, weights=weights), weights.sum() ** -0.5
-    assert abs(mean - 1) < largest_z(1) * error, f"{mean} ± {error}"
-    for off in 0.995, 1.005:
-        assert abs(mean - off) > largest_z(1) * error, f"too noisy to see half a percent: {error}"
+    assert_pooled([arrangement(*case) for case in CASES if case[1] == where])
 
 
 def test_a_boundary_between_the_eye_and_the_near_plane_has_been_passed():
