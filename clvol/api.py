@@ -6,7 +6,6 @@ import logging
 import math
 import operator
 import time
-from collections.abc import Sequence
 from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +14,6 @@ from clvol.base.interrupts import interruptible
 from clvol.base.progress import Progress, ProgressCallback, RichProgress
 from clvol.device.device import Device, open_device
 from clvol.errors import OptionError, shown
-from clvol.picture.result import Result
 from clvol.planning import registry
 from clvol.planning.choices import Choices
 from clvol.planning.plan import Plan
@@ -25,7 +23,10 @@ from clvol.rendering.session import MAX_SAMPLES, Session
 from clvol.scene.records import Scene
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from clvol.lab.pilot import Found
+    from clvol.picture.result import Result
 
 log = logging.getLogger("clvol")
 

@@ -105,7 +105,7 @@ def build(device: Device, source: str, name: str) -> cl.Program:
         return device.programs[source]
     except cl.RuntimeError as error:
         info = cl.program_build_info.LOG
-        log = program.get_build_info(device.queue.device, info).strip() or str(error)  # type: ignore[no-untyped-call]
+        log = program.get_build_info(device.queue.device, info).strip() or str(error)
         raise DeviceError(f"kernel {name!r} does not build on {device.description}:\n{log}") from error
 
 

@@ -45,18 +45,25 @@ class Candidate:
 
     Parameters
     ----------
-    label : the choices of `CHOSEN` in force.
+    label : the choices of `CHOSEN` in force.  opened : None once its memory is given back.
     images : float32 (height, width, channels) of each round.  seconds : of each round.
     extra : seconds that precomputation adds to a round, see `precomputation`.
     largest_weight : of any round.
     """
 
     label: str
-    trial: Trial
+    opened: Trial | None
     images: list[np.ndarray] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
     extra: float = 0.0
     largest_weight: float = 1.0
+
+    @property
+    def trial(self) -> Trial:
+        """What renders it, while it is open."""
+        if self.opened is None:
+            raise ValueError(f"{self.label} is closed")
+        return self.opened
 
     @property
     def heavy(self) -> bool:

@@ -7,16 +7,20 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from clvol.errors import OptionError
-from clvol.lab.trials import Trial
 from clvol.planning.choices import Choices
-from clvol.planning.plan import Plan
 from clvol.planning.registry import FAMILIES
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from clvol.lab.trials import Trial
+    from clvol.planning.plan import Plan
 
 MOST_CONSIDERED = 4096
 """Of a larger product of choices so many combinations are drawn, always the same."""
@@ -58,7 +62,7 @@ def in_force(scene: Plan, names: Mapping[str, str]) -> Names | None:
     `scene`: any plan of it.
     """
     try:
-        return names_in_force(scene.having(Choices(**names)))
+        return names_in_force(scene.having(Choices().but(**names)))
     except OptionError:
         return None
 
@@ -117,10 +121,10 @@ def covering(scene: Plan, first: Mapping[str, str], most: int | None = None) -> 
     chosen: list[Names] = []
 
     def mark(row: np.ndarray) -> None:
-        for f, table in enumerate(singles):
-            table[row[f]] = True
-        for (f, g), table in pairs.items():
-            table[row[f], row[g]] = True
+        for f, single in enumerate(singles):
+            single[row[f]] = True
+        for (f, g), pair in pairs.items():
+            pair[row[f], row[g]] = True
 
     if min(start) >= 0:
         mark(np.array(start))

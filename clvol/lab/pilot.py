@@ -12,8 +12,8 @@ import logging
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from clvol.device.device import Device
 from clvol.device.programs import stage_source
 from clvol.errors import OptionError
 from clvol.lab.candidates import (
@@ -30,13 +30,16 @@ from clvol.lab.quiet import quiet_renders
 from clvol.lab.reduced import reduced
 from clvol.lab.seeds import independent_seeds
 from clvol.lab.trials import Trial
-from clvol.planning.choices import Choices
-from clvol.planning.needs import MajorantNeeds
 from clvol.planning.plan import Plan
 from clvol.planning.registry import FAMILIES
 from clvol.rendering.session import MAX_SAMPLES, Session
-from clvol.scene.records import Scene
 from clvol.tables.prepare import PreparedScene, prepare
+
+if TYPE_CHECKING:
+    from clvol.device.device import Device
+    from clvol.planning.choices import Choices
+    from clvol.planning.needs import MajorantNeeds
+    from clvol.scene.records import Scene
 
 log = logging.getLogger("clvol.pilot")
 CHOSEN = ("technique", "transmittance", "majorant")
@@ -154,7 +157,10 @@ class Pilot:
             for candidate in both if turn % 2 else both[::-1]:
                 self.render(candidate)
         fresh = [candidate.since(n) for candidate, n in zip(both, first, strict=True)]
-        return Relative(0.0, 0.0, 0.0) if doubtful(*fresh, fresh) else relative_efficiency(*fresh)
+        choice, rules = fresh
+        return (
+            Relative(0.0, 0.0, 0.0) if doubtful(choice, rules, fresh) else relative_efficiency(choice, rules)
+        )
 
     def _open(self, choices: Choices) -> Candidate:
         """A candidate; scenes prepared for the same needs are prepared once."""
@@ -179,7 +185,7 @@ class Pilot:
         auto.render(next(self.seeds), self.spp)
         each = auto.seconds.pop() / (count * self.spp)  # seconds of a sample of a pixel
         auto.images.clear()
-        expected = self.time_limit or each * pixels * self.samples
+        expected = self.time_limit or each * pixels * (self.samples or MAX_SAMPLES)
         self.budget = min(max(SHARE * expected, LEAST_SECONDS), MOST_SECONDS)
         samples = self.budget / (max(self.planned, 1) * each * _TYPICAL)
         least = _LEAST_PATHS / auto.trial.session.plan.jobs_per_sample
@@ -214,8 +220,11 @@ class Pilot:
         return list(self.admitted(asked, [best]))
 
     def admitted(self, asked: Iterable[Choices], among: list[Candidate]) -> Iterator[Candidate]:
-        """Candidates of the choices asked for, but for those that cannot be right, and those that compose the
-        same kernels as one of `among` or of each other; like `among[0]` in all that they leave at auto."""
+        """Candidates of the choices asked for, but for those that cannot be right or are the same as others.
+
+        The same are those that compose the same kernels as one of `among` or of each other.  Candidates are
+        like `among[0]` in all that they leave at auto.
+        """
         plan = among[0].trial.session.plan
         seen = {self._sources(c.trial.session.plan) for c in among}
         for choices in asked:
@@ -228,11 +237,11 @@ class Pilot:
     def _close(self, candidates: list[Candidate]) -> None:
         """Give back the device's memory of those that are out."""
         for candidate in candidates if not self.keep else ():
-            candidate.trial = None
+            candidate.opened = None
 
     def _fits(self, candidate: Candidate) -> bool:
         """Whether another as large as this fits on the device; what is left out is said."""
-        held = [c.trial.session.wavefront.bytes for c in self.candidates if c.trial is not None]
+        held = [c.opened.session.wavefront.bytes for c in self.candidates if c.opened is not None]
         fits = sum(held) + candidate.trial.session.wavefront.bytes <= self.device.info.global_memory / 2
         if not fits:
             log.warning(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from clvol.lab.combinations import unbiased
 from clvol.lab.pilot import CHOSEN
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from clvol.scene.records import Scene
 
 

@@ -170,7 +170,7 @@ def open_covering(
         )
     for names in found.combinations:
         tell("kernels", len(trials), total)
-        trials.append(Trial.open(device, scene, Choices(**names)))
+        trials.append(Trial.open(device, scene, Choices().but(**names)))
     tell("kernels", total, total)
     return found.pairs, found.all_pairs
 
@@ -197,11 +197,11 @@ def _rendered(trials: list[Trial], spp: int, count: int, seeds: Iterator[int], t
     except KeyboardInterrupt:
         if len(rendered) < ENOUGH_ROUNDS:
             raise
-    for one, results in zip(tested, zip(*rendered, strict=True), strict=True):
-        one.images = np.stack([r.image for r in results])
+    for one, own in zip(tested, zip(*rendered, strict=True), strict=True):
+        one.images = np.stack([r.image for r in own])
         one.totals = {
-            name: sum(r.stats[name] for r in results)
+            name: sum(r.stats[name] for r in own)
             for name in ("non_finite", "walks_exhausted", "majorant_violations", "lookups")
         }
-        one.largest_weight = max(r.stats["largest_weight"] for r in results)
+        one.largest_weight = max(r.stats["largest_weight"] for r in own)
     return tested

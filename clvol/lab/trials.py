@@ -8,16 +8,20 @@ is kept apart: precomputation (volumes, majorants, trees), which counts, and ker
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
 
-from clvol.device.device import Device
-from clvol.picture.result import Result
-from clvol.planning.choices import Choices
 from clvol.planning.registry import FAMILIES
 from clvol.rendering.outcome import make_result
 from clvol.rendering.session import Session
-from clvol.scene.records import Scene
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from clvol.device.device import Device
+    from clvol.picture.result import Result
+    from clvol.planning.choices import Choices
+    from clvol.scene.records import Scene
 
 
 @dataclass(eq=False)
@@ -66,16 +70,23 @@ class Trial:
         return make_result(self.session, 0, done)
 
 
-def rounds(trials: list[Trial], spp: list[int], seeds: Iterator[int]) -> Iterator[list[Result]]:
+class Renders(Protocol):
+    """What can take part in rounds."""
+
+    def render(self, seed: int, spp: int) -> Result:
+        """Samples 0 to spp of every pixel."""
+
+
+def rounds(trials: Sequence[Renders], spp: Sequence[int], seeds: Iterator[int]) -> Iterator[list[Result]]:
     """Rounds in which every trial renders once, each with a seed of its own.
 
     The order turns from round to round, so that no trial always begins.
     """
     turn = 0
     while True:
-        results: list[Result | None] = [None] * len(trials)
+        results: dict[int, Result] = {}
         for n in range(len(trials)):
             place = (n + turn) % len(trials)
             results[place] = trials[place].render(next(seeds), spp[place])
-        yield results
+        yield [results[place] for place in range(len(trials))]
         turn += 1

@@ -1,4 +1,4 @@
-"""What follows from a scene's features and the choices made for it: is this needed, and how many?"""
+"""What follows from a scene's features and the choices made for it: what is needed, and how many of it."""
 
 from __future__ import annotations
 

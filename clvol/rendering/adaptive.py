@@ -11,13 +11,16 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from clvol.base.progress import Progress, ProgressCallback
 from clvol.picture.result import relative_noise
-from clvol.rendering.film import Film
 from clvol.rendering.session import MAX_SAMPLES, Session, nothing_finished, seed_words
+
+if TYPE_CHECKING:
+    from clvol.rendering.film import Film
 
 log = logging.getLogger("clvol")
 
@@ -44,12 +47,14 @@ Rounding = Callable[[np.ndarray], np.ndarray]
 
 def chunks(samples: np.ndarray) -> np.ndarray:
     """Up to multiples of CHUNK; int64."""
-    return CHUNK * np.ceil(np.minimum(samples, MAX_SAMPLES // 2) / CHUNK).astype(np.int64)
+    whole: np.ndarray = np.ceil(np.minimum(samples, MAX_SAMPLES // 2) / CHUNK)
+    return CHUNK * whole.astype(np.int64)
 
 
 def powers_of_two(samples: np.ndarray) -> np.ndarray:
     """Up to powers of two, for low-discrepancy samples: others are noisier than half as many; int64."""
-    return 2 ** np.ceil(np.log2(np.clip(samples, 1, MAX_SAMPLES // 2))).astype(np.int64)
+    powers: np.ndarray = 2 ** np.ceil(np.log2(np.clip(samples, 1, MAX_SAMPLES // 2))).astype(np.int64)
+    return powers
 
 
 def optimum(noise: np.ndarray, allowed: float, least: float = LEAST) -> np.ndarray:
@@ -306,4 +311,5 @@ def _smoothed(variance: np.ndarray, width: int, height: int) -> np.ndarray:
 
     picture = np.nan_to_num(variance, posinf=0.0).reshape(height, width, -1)
     smooth = uniform_filter(picture, (_SMOOTHED, _SMOOTHED, 1), mode="nearest")  # may round below 0
-    return np.maximum(smooth, 0.0).reshape(variance.shape)
+    positive: np.ndarray = np.maximum(smooth, 0.0)
+    return positive.reshape(variance.shape)

@@ -6,14 +6,19 @@ samples is in the picture.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+import numpy.typing as npt
 import pyopencl as cl
 
 from clvol import layout
-from clvol.device.device import Device
 from clvol.picture.estimate import Estimate, Moments, Replicates, Uneven
-from clvol.planning.plan import Plan
 from clvol.tables.sobol import samples_of_each
+
+if TYPE_CHECKING:
+    from clvol.device.device import Device
+    from clvol.planning.plan import Plan
 
 _READ_PIXELS = 1 << 18
 HOST_BYTES = 250
@@ -51,14 +56,15 @@ class Film:
     def clear(self, seed: tuple[int, int]) -> None:
         """Forget every sample; the next ones are another seed's."""
         self.seed = seed
+        zero = np.zeros(1, np.uint32)
         for buffer in self.buffers.values():
-            cl.enqueue_fill_buffer(self.device.queue, buffer, np.uint32(0), 0, buffer.size)
+            cl.enqueue_fill_buffer(self.device.queue, buffer, zero, 0, buffer.size)
         listed = self.pixels if self.plan.pixel_list else 0
         self.samples = np.zeros(listed, np.int64)  # of each pixel, where they are not the same of all
         self.slot_totals = dict.fromkeys(layout.slot_fields(self.plan.macros), 0.0)
 
-    def _read(self, name: str, shape: tuple[int, ...], dtype: type) -> np.ndarray:
-        array = np.empty(shape, dtype)
+    def _read(self, name: str, shape: tuple[int, ...], dtype: npt.DTypeLike) -> np.ndarray:
+        array: np.ndarray = np.empty(shape, dtype)
         cl.enqueue_copy(self.device.queue, array, self.buffers[name], is_blocking=True)
         return array
 

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import logging
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from clvol import layout
-from clvol.picture.estimate import Estimate
 from clvol.picture.result import Result, said_ranges
 from clvol.planning import registry
-from clvol.rendering.session import Session
 from clvol.scene.digest import scene_digest
 from clvol.version import __version__
+
+if TYPE_CHECKING:
+    from clvol.picture.estimate import Estimate
+    from clvol.rendering.session import Session
 
 log = logging.getLogger("clvol")
 LARGE_WEIGHT = 100.0
@@ -24,6 +26,7 @@ def make_result(session: Session, first: int, count: int) -> Result:
     """The film as a Result; of samples `first` to `first + count`, or of as many as each listed pixel got."""
     film, window = session.wavefront.film, session.prepared.scene.film.window
     shape = window[3], window[2]
+    estimate: Estimate
     if session.plan.pixel_list:
         estimate, samples = film.uneven_estimate(), film.samples
     else:
@@ -99,7 +102,8 @@ def _pictures(session: Session, samples: np.ndarray, estimate: Estimate) -> dict
 
 def _variance(estimate: Estimate) -> np.ndarray:
     """Of each pixel's mean, the mean of the channels', float64 (pixels,)."""
-    return estimate.mean_and_variance()[1].mean(axis=-1)
+    grey: np.ndarray = estimate.mean_and_variance()[1].mean(axis=-1)
+    return grey
 
 
 def _efficiency(
@@ -118,7 +122,8 @@ def _efficiency(
     spent = walking * share + (sum(seconds.values()) - walking) * even
     cost = variance * spent
     known = np.isfinite(cost) & (cost > 0)
-    return np.divide(1.0, cost, out=np.zeros(film.pixels), where=known)
+    efficiency: np.ndarray = np.divide(1.0, cost, out=np.zeros(film.pixels), where=known)
+    return efficiency
 
 
 def _first_hit(session: Session, name: str, paths: np.ndarray) -> np.ndarray:

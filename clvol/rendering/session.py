@@ -4,28 +4,32 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from clvol import layout
 from clvol.base.arguments import check_seed
 from clvol.base.progress import FilmNoise, Progress, ProgressCallback
-from clvol.device.device import Device
 from clvol.device.programs import build_stages
 from clvol.errors import RenderError
 from clvol.picture.result import relative_noise
-from clvol.planning.choices import Choices
 from clvol.planning.in_force import warnings
 from clvol.planning.plan import Plan
 from clvol.planning.settled import Tuning
 from clvol.rendering.upload import upload_scene
 from clvol.rendering.wavefront import Pool, Progressed, Wavefront
-from clvol.scene.records import Scene
 from clvol.tables.camera import camera_rays
 from clvol.tables.pixel_filter import FILTER_BINS
 from clvol.tables.prepare import PreparedScene, prepare
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from clvol.device.device import Device
+    from clvol.planning.choices import Choices
+    from clvol.scene.records import Scene
 
 log = logging.getLogger("clvol")
 MAX_SAMPLES = 2**32 - 1

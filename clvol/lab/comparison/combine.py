@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-from clvol.device.device import Device
 from clvol.errors import OptionError
 from clvol.lab.trials import Trial
 from clvol.planning.choices import Choices
 from clvol.planning.registry import FAMILIES
-from clvol.scene.records import Scene
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from clvol.device.device import Device
+    from clvol.scene.records import Scene
 
 
 @dataclass(frozen=True, eq=False)
