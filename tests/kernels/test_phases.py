@@ -240,7 +240,7 @@ def test_loops_are_compiled_for_mixtures_only(device):
     blended = {name: phase_probe(device, phase).plan.macros for name, phase in MIXTURES.items()}
     with_loop = {name for name, defines in blended.items() if defines["CLVOL_HAS_BLEND"]}
     assert with_loop == {"two of a kind", "two kinds", "nested", "a rare one"}
-    with_rayleigh = {name for name, defines in blended.items() if defines["CLVOL_HAS_RAYLEIGH"]}
+    with_rayleigh = {name for name, defines in blended.items() if defines["CLVOL_PHASE_RAYLEIGH"]}
     assert with_rayleigh == {"rayleigh", "two kinds", "nested", "only the second"}
 
 
