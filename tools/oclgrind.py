@@ -87,7 +87,7 @@ CASES = {
     "fire": Case("fire", SIDES, {"technique": "weighted-delta", "sampler": "independent", "aov": AOVS}),
 }
 
-HARMLESS = ("CONTROL_NEXT_JOB", "idle_counter")
+HARMLESS = ("COUNTER_NEXT_JOB", "idle_slots")
 """Numbers that are read while an atomic may change them.  A slot looks at the number of jobs before it takes
 one by the atomic, which decides; and at the number of idle slots, which is not 0 while it is idle itself.
 Any value that these ever had will do."""

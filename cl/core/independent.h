@@ -4,10 +4,10 @@
 #include "core/random.h"
 #include "core/scene.h"
 
-/* Four numbered dimensions, full 32-bit.  `interval` tells apart the walks of one bounce. */
-INLINE uint4 decision_block(const Scene *scene, SampleKey key, uint block, uint interval)
+/* Four numbered dimensions, full 32-bit.  `segment` tells apart the walks of one bounce. */
+INLINE uint4 decision_block(const Scene *scene, SampleKey key, uint block, uint segment)
 {
-    const uint4 counter = (uint4)(key.pixel, key.sample, block_number(key, block), interval);
+    const uint4 counter = (uint4)(key.pixel, key.sample, block_number(key, block), segment);
     return philox4x32(counter, (uint2)(scene->render->seed[0], scene->render->seed[1]));
 }
 

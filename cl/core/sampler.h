@@ -1,8 +1,8 @@
 /* Samplers: where a path's decisions get their numbers.  Each header that --sampler names implements
 
-       uint4 decision_block(scene, key, block, interval);
+       uint4 decision_block(scene, key, block, segment);
 
-   four numbered dimensions, full 32-bit, for a BLOCK_* of core/random.h; `interval` tells apart the walks of one
+   four numbered dimensions, full 32-bit, for a BLOCK_* of core/random.h; `segment` tells apart the walks of one
    bounce. */
 #ifndef CLVOL_CORE_SAMPLER_H
 #define CLVOL_CORE_SAMPLER_H

@@ -52,18 +52,18 @@ INLINE uint4 sobol_point(const Scene *scene, uint index)
     return point;
 }
 
-/* Four numbered dimensions, full 32-bit.  `interval` tells apart the walks of one bounce. */
-INLINE uint4 decision_block(const Scene *scene, SampleKey key, uint block, uint interval)
+/* Four numbered dimensions, full 32-bit.  `segment` tells apart the walks of one bounce. */
+INLINE uint4 decision_block(const Scene *scene, SampleKey key, uint block, uint segment)
 {
     const uint2 seed = (uint2)(scene->render->seed[0], scene->render->seed[1]);
     const uint randomization = key.sample % CLVOL_RANDOMIZATIONS, index = key.sample / CLVOL_RANDOMIZATIONS;
     const uint number = block_number(key, block);
-    const uint place = mixed_bits(number ^ (interval << 16) ^ mixed_bits(seed.x ^ mixed_bits(seed.y ^ randomization)));
+    const uint place = mixed_bits(number ^ (segment << 16) ^ mixed_bits(seed.x ^ mixed_bits(seed.y ^ randomization)));
     const uint order = reverse_bits(owen_scramble(reverse_bits(index), mixed_bits(key.pixel ^ place)));
     uint4 point = sobol_point(scene, (order & SOBOL_SHUFFLED) | (index & ~SOBOL_SHUFFLED));
     if (block == BLOCK_LIGHT || block == BLOCK_SURFACE)
         point = point.zxyw; /* the best pair is for a light's point, or the direction */
-    const uint4 scramble = philox4x32((uint4)(key.pixel, randomization, number, interval), seed);
+    const uint4 scramble = philox4x32((uint4)(key.pixel, randomization, number, segment), seed);
     return (uint4)(reverse_bits(owen_scramble(point.x, scramble.x)), reverse_bits(owen_scramble(point.y, scramble.y)),
                    reverse_bits(owen_scramble(point.z, scramble.z)), reverse_bits(owen_scramble(point.w, scramble.w)));
 }

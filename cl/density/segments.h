@@ -1,4 +1,4 @@
-/* A ray through a sampled density, piece by piece: between the planes of the samples (of the cells half-way
+/* A ray through a sampled density, segment by segment: between the planes of the samples (of the cells half-way
    between them, for a nearest filter) the density is a polynomial of the ray parameter, of degree 3
    for a trilinear filter, so that two Gauss-Legendre points integrate it exactly (METHODS §3, regular). */
 #ifndef CLVOL_DENSITY_SEGMENTS_H
@@ -7,39 +7,40 @@
 #include "geometry/lattice.h"
 #include "tracking/walk.h"
 
-/* Starts the pieces of the stretch [t, t_end] of the ray; their parameters count from t. */
+/* Starts the segments of [t, t_end] of the ray; their parameters count from t. */
 INLINE LatticeWalk segments_begin(const MediumRay *in, float t, float t_end)
 {
     __global const Volume *volume = in->scene->volumes + in->medium->sigma_t_volume;
     const bool nearest = volume_is_nearest(volume);
-    const int more = nearest ? 0 : 1; /* the clamped borders are pieces of their own */
-    Ray ray = in->ray;
+    const int more = nearest ? 0 : 1; /* the clamped borders are segments of their own */
+    Ray ray = in->index_ray;
     ray.o += t * ray.d + (nearest ? 0.5f : 1.0f);
     return lattice_begin(ray, volume->size[0] + more, volume->size[1] + more, volume->size[2] + more, 1.0f, t_end - t);
 }
 
-/* Optical depth of a piece. */
-INLINE Extinction segment_depth(const MediumRay *in, float3 start, const LatticeWalk *piece, Stream *stream, Tally *tally)
+/* Optical depth of a segment. */
+INLINE Extinction segment_depth(const MediumRay *in, float3 start, const LatticeWalk *segment, Stream *stream,
+                                Tally *tally)
 {
-    const float half_length = 0.5f * (piece->t_end - piece->t), middle = 0.5f * (piece->t_end + piece->t);
+    const float half_length = 0.5f * (segment->t_end - segment->t), middle = 0.5f * (segment->t_end + segment->t);
     const float offset = half_length * 0.57735026919f;
-    const Extinction a = extinction_at(in, start + (middle - offset) * in->ray.d, stream, tally);
-    const Extinction b = extinction_at(in, start + (middle + offset) * in->ray.d, stream, tally);
+    const Extinction a = extinction_at(in, start + (middle - offset) * in->index_ray.d, stream, tally);
+    const Extinction b = extinction_at(in, start + (middle + offset) * in->index_ray.d, stream, tally);
     return half_length * (a + b);
 }
 
-/* sigma_t = a + b w + c w² + d w³ over a piece, w from 0 at its start to 8 at its end. */
+/* sigma_t = a + b w + c w² + d w³ over a segment, w from 0 at its start to 8 at its end. */
 typedef struct {
     Extinction a, b, c, d;
 } Cubic;
 
-INLINE Cubic segment_cubic(const MediumRay *in, float3 start, const LatticeWalk *piece, Stream *stream, Tally *tally)
+INLINE Cubic segment_cubic(const MediumRay *in, float3 start, const LatticeWalk *segment, Stream *stream, Tally *tally)
 {
-    const float unit = 0.125f * (piece->t_end - piece->t);
-    const Extinction f1 = extinction_at(in, start + (piece->t + unit) * in->ray.d, stream, tally);
-    const Extinction f3 = extinction_at(in, start + (piece->t + 3.0f * unit) * in->ray.d, stream, tally);
-    const Extinction f5 = extinction_at(in, start + (piece->t + 5.0f * unit) * in->ray.d, stream, tally);
-    const Extinction f7 = extinction_at(in, start + (piece->t + 7.0f * unit) * in->ray.d, stream, tally);
+    const float unit = 0.125f * (segment->t_end - segment->t);
+    const Extinction f1 = extinction_at(in, start + (segment->t + unit) * in->index_ray.d, stream, tally);
+    const Extinction f3 = extinction_at(in, start + (segment->t + 3.0f * unit) * in->index_ray.d, stream, tally);
+    const Extinction f5 = extinction_at(in, start + (segment->t + 5.0f * unit) * in->index_ray.d, stream, tally);
+    const Extinction f7 = extinction_at(in, start + (segment->t + 7.0f * unit) * in->index_ray.d, stream, tally);
     /* through the four values, about the middle w = 4, then moved to the start */
     const Extinction inner = 0.5f * (f5 - f3), outer = 0.5f * (f7 - f1);
     const Extinction d = (outer - 3.0f * inner) * (1.0f / 24.0f), b = inner - d;

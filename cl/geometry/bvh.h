@@ -78,7 +78,7 @@ INLINE Slabs slabs_of(Ray ray)
     return slabs;
 }
 
-/* Which children a ray's stretch from `least` to `most` meets; `entry`: where, at the earliest. */
+/* Which children a ray's segment from `least` to `most` meets; `entry`: where, at the earliest. */
 INLINE uint children_met(__global const float8 *node, const Slabs *slabs, float least, float most, float8 *entry)
 {
     const float8 x0 = (node[slabs->near_x] - slabs->o.x) * slabs->inverse_d.x;

@@ -15,12 +15,12 @@ typedef struct {
 } LatticeAxis;
 
 typedef struct {
-    float t; /* the current cell's stretch of the ray is [t, t_end] */
+    float t; /* the current cell's segment of the ray is [t, t_end] */
     float t_end;
     float t_max;
     LatticeAxis x, y, z;
     int cell; /* number of the current cell */
-    int step; /* to add before the next stretch */
+    int step; /* to add before the next segment */
 } LatticeWalk;
 
 /* Starts one axis; returns the number of the cell that holds o. */

@@ -59,7 +59,7 @@ __kernel void accumulate_kernel(__global const float *results, __global float *f
 #if CLVOL_PIXEL_LIST
                                 __global const uint *pixel_list,
 #endif
-                                __global uint *control, uint ring_pass, uint pass_jobs, uint samples,
+                                __global uint *counters, uint ring_pass, uint pass_jobs, uint samples,
                                 uint first_sample, uint pixels)
 {
     uint pixel = get_global_id(0);
@@ -87,7 +87,7 @@ __kernel void accumulate_kernel(__global const float *results, __global float *f
         for (uint s = 0; s < samples; ++s) {
             const float x = values[s * CLVOL_CHANNELS];
             if (!isfinite(x))
-                atomic_inc(control + CONTROL_NON_FINITE);
+                atomic_inc(counters + COUNTER_NON_FINITE);
             peak = max_of(peak, abs_of(x));
         }
         add_samples(values, samples, first_sample, film + (size_t)pixel * (2 * FILM_PARTS * CLVOL_CHANNELS) + 2 * c);

@@ -14,7 +14,7 @@ __kernel __attribute__((reqd_work_group_size(CLVOL_LOCAL_SIZE, 1, 1))) void STAG
     STAGE_WAKES(&scene, group);
     barrier(CLK_GLOBAL_MEM_FENCE); /* slots that fall idle below are not to be looked at above */
 #endif
-    const uint count = *queue_counter(&scene, group, STAGE_QUEUE);
+    const uint count = *queue_length(&scene, group, STAGE_QUEUE);
     __global const uint *slots = queue_entries(&scene, group, STAGE_QUEUE);
 #ifdef STAGE_STANDS_BY
     uint steps = 0;

@@ -20,8 +20,8 @@ INLINE MajorantWalk majorant_begin(const MediumRay *in)
     MajorantWalk walk;
     __global const Medium *medium = in->medium;
     const float scale = 1.0f / medium->cell_size;
-    walk.o = in->ray.o * scale;
-    walk.d = in->ray.d * scale;
+    walk.o = in->index_ray.o * scale;
+    walk.d = in->index_ray.d * scale;
     walk.inverse_d = 1.0f / walk.d; /* infinite for 0, and not used there */
     walk.at.x = clamp_int(floor_int(walk.o.x), 0, medium->cells[0] - 1);
     walk.at.y = clamp_int(floor_int(walk.o.y), 0, medium->cells[1] - 1);

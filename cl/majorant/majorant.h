@@ -1,4 +1,4 @@
-/* Majorant walks cut the stretch [0, t_max] of a MediumRay into segments [t, t_end] along which one bound
+/* Majorant walks cut [0, t_max] of a MediumRay into segments [t, t_end] along which one bound
    `majorant` of sigma_t holds (per world length).  Each header that --majorant names implements
 
        MajorantWalk majorant_begin(medium_ray);

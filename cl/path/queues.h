@@ -7,9 +7,9 @@
 #define CLVOL_PATH_QUEUES_H
 #include "core/scene.h"
 
-INLINE __global uint *queue_counter(const Scene *scene, uint group, uint queue)
+INLINE __global uint *queue_length(const Scene *scene, uint group, uint queue)
 {
-    return scene->counts + group * COUNTER_STRIDE + queue;
+    return scene->queue_lengths + group * QUEUE_LENGTHS_STRIDE + queue;
 }
 
 INLINE __global uint *queue_entries(const Scene *scene, uint group, uint queue)
@@ -18,14 +18,14 @@ INLINE __global uint *queue_entries(const Scene *scene, uint group, uint queue)
 }
 
 /* Slots of the group that hold no path. */
-INLINE __global uint *idle_counter(const Scene *scene, uint group)
+INLINE __global uint *idle_slots(const Scene *scene, uint group)
 {
-    return scene->counts + group * COUNTER_STRIDE + QUEUE_COUNT;
+    return scene->queue_lengths + group * QUEUE_LENGTHS_STRIDE + QUEUE_COUNT;
 }
 
 INLINE void queue_push(const Scene *scene, uint group, uint queue, uint slot)
 {
-    const uint place = atomic_inc(queue_counter(scene, group, queue));
+    const uint place = atomic_inc(queue_length(scene, group, queue));
     queue_entries(scene, group, queue)[place] = slot;
 }
 
@@ -35,7 +35,7 @@ INLINE void queue_clear(const Scene *scene, uint group, uint queue)
 {
     barrier(CLK_GLOBAL_MEM_FENCE);
     if (get_local_id(0) == 0)
-        *queue_counter(scene, group, queue) = 0;
+        *queue_length(scene, group, queue) = 0;
 }
 
 #endif

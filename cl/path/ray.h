@@ -19,9 +19,9 @@ INLINE float ray_limit(const Scene *scene, uint slot, Ray ray)
     return scene->render->camera_far / dot(ray.d, load_vector(scene->render->camera_forward));
 }
 
-/* Where the stretch of ray ends that walks go along: at a surface, or, since beyond the far plane no boundary
+/* Where the segment of the ray ends that walks go along: at a surface, or, since beyond the far plane no boundary
    is met that might end a medium, there. */
-INLINE float stretch_end(const Scene *scene, uint slot, Ray ray)
+INLINE float segment_end(const Scene *scene, uint slot, Ray ray)
 {
     const float reach = path_hit_t(scene, slot);
     return CLVOL_BOUNDARY_WORDS > 0 ? min_of(reach, ray_limit(scene, slot, ray)) : reach;

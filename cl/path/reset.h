@@ -6,7 +6,7 @@
 /* A new ray has passed nothing yet. */
 INLINE void reset_ray(const Scene *scene, uint slot)
 {
-    set_path_stretch(scene, slot, 0);
+    set_path_segment(scene, slot, 0);
     set_path_after_t(scene, slot, 0.0f);
     set_path_after_primitive(scene, slot, NO_PRIMITIVE);
 }

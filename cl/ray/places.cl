@@ -1,10 +1,10 @@
-/* What a ray passes: the surfaces in order (t, number, whether it enters), and the interval of each medium.
+/* What a ray passes: the surfaces in order (t, number, whether it enters), and the span of each medium.
    One work-item; reads origin (3) and direction (3). */
 #include "geometry/bvh.h"
-#include "geometry/interval.h"
+#include "geometry/span.h"
 #include "geometry/surface.h"
 
-__kernel void places(CLVOL_ARGUMENTS, __global const float *given, __global float *hits, __global float *intervals,
+__kernel void places(CLVOL_ARGUMENTS, __global const float *given, __global float *hits, __global float *spans,
                      uint media, uint capacity)
 {
     const Scene scene = CLVOL_SCENE;
@@ -16,9 +16,9 @@ __kernel void places(CLVOL_ARGUMENTS, __global const float *given, __global floa
     for (uint m = 0; m < media; ++m) {
         Span span;
         medium_span(scene.media + m, ray, 0.0f, INFINITY, &span);
-        intervals[3 * m] = span.base;
-        intervals[3 * m + 1] = span.start;
-        intervals[3 * m + 2] = span.end;
+        spans[3 * m] = span.base;
+        spans[3 * m + 1] = span.start;
+        spans[3 * m + 2] = span.end;
     }
 #if CLVOL_HAS_SURFACES
     Hit hit = {0.0f, 0.0f, 0.0f, NO_PRIMITIVE};

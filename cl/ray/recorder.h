@@ -3,6 +3,7 @@
 #ifndef CLVOL_RAY_RECORDER_H
 #define CLVOL_RAY_RECORDER_H
 #include "core/math.h"
+#include "core/types.h"
 #include "tracking/tally.h"
 
 /* An event: its kind, its distance along the ray, three numbers. */
@@ -36,11 +37,11 @@ INLINE void record_event(Tally *tally, int kind, float t, float3 value)
 }
 
 /* The ray parameter of an index position: of use to a picture, too coarse for anything else. */
-#define PARAMETER_OF(in, p) (dot((p) - (in)->ray.o, (in)->ray.d) / dot((in)->ray.d, (in)->ray.d))
+INLINE float parameter_of(Ray ray, float3 p) { return dot(p - ray.o, ray.d) / dot(ray.d, ray.d); }
 
 #define RECORD_WALKS
 #define RECORD_TENTATIVE(t, rate, tally) record_event(tally, EVENT_TENTATIVE, t, (float3)(rate))
-#define RECORD_LOOKUP(in, p, sigma_t, tally) record_event(tally, EVENT_LOOKUP, PARAMETER_OF(in, p), (float3)(sigma_t))
+#define RECORD_LOOKUP(in, p, sigma_t, tally) record_event(tally, EVENT_LOOKUP, parameter_of((in)->index_ray, p), (float3)(sigma_t))
 #define RECORD_NULL(beta, tally) record_event(tally, EVENT_NULL, 0.0f, (float3)(beta))
 #define RECORD_REAL(t, beta, tally) record_event(tally, EVENT_REAL, t, (float3)(beta))
 #define RECORD_ESTIMATE(t, estimate, tally) record_event(tally, EVENT_ESTIMATE, t, ((Recorder *)(tally))->share * (float3)(estimate))

@@ -30,7 +30,7 @@
 /* Absorption at a collision (METHODS §2): by event, by weight, or by weight as long as the path's weight
    is worth following and by event below.  Each multiplies the expected weight by the albedo.  By event, a path
    of several channels chooses between scattering and absorption as it does between events of its walk. */
-INLINE bool survives_absorption(const Scene *scene, uint slot, SampleKey key, uint interval, Spectrum albedo,
+INLINE bool survives_absorption(const Scene *scene, uint slot, SampleKey key, uint walk, Spectrum albedo,
                                 Spectrum *beta)
 {
     float survival = 1.0f;
@@ -53,7 +53,7 @@ INLINE bool survives_absorption(const Scene *scene, uint slot, SampleKey key, ui
             survival = weight > 0.0f ? 1.0f : 0.0f;
     }
     if (survival < 1.0f) {
-        const uint4 k = decision_block(scene, key, BLOCK_WALK, interval);
+        const uint4 k = decision_block(scene, key, BLOCK_WALK, walk);
         if (!choose_event(k.y, survival, 1.0f - survival))
             return false;
         if (CLVOL_ABSORPTION == ABSORPTION_MIXED)
@@ -119,7 +119,7 @@ INLINE bool shade_collision(const Scene *scene, uint slot, bool *shadow_ray)
 {
     const int number = path_medium(scene, slot);
     __global const Medium *medium = scene->media + number;
-    const uint interval = path_stretch(scene, slot) * scene->render->media + (uint)number;
+    const uint walk = path_segment(scene, slot) * scene->render->media + (uint)number;
     const float3 p = path_ray(scene, slot).o;
     const int channel = (int)path_channel(scene, slot);
     Spectrum beta = path_beta(scene, slot);
@@ -132,7 +132,7 @@ INLINE bool shade_collision(const Scene *scene, uint slot, bool *shadow_ray)
 #endif
 #if CLVOL_HAS_SCATTERING
     const SampleKey key = path_key(scene, slot);
-    if (!survives_absorption(scene, slot, key, interval, medium_albedo(scene, medium, p, channel), &beta))
+    if (!survives_absorption(scene, slot, key, walk, medium_albedo(scene, medium, p, channel), &beta))
         return false;
     return scatter(scene, slot, key, medium, beta, shadow_ray);
 #else

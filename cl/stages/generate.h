@@ -19,7 +19,7 @@ INLINE void write_result(const Scene *scene, uint slot, uint job)
 #endif
     write_counts(scene, slot, place);
     write_first_hit(scene, slot, place);
-    atomic_inc(scene->control + CONTROL_DONE + place / scene->render->pass_jobs);
+    atomic_inc(scene->counters + COUNTER_DONE + place / scene->render->pass_jobs);
 }
 
 /* Offset of the sample from the pixel's corner along one axis, drawn from the pixel filter's magnitude; a filter
@@ -125,12 +125,12 @@ INLINE void start_job(const Scene *scene, uint slot, uint job)
    idle slots do not fight over it at the end of a render. */
 INLINE bool take_job(const Scene *scene, uint group, uint slot)
 {
-    const uint limit = scene->control[CONTROL_JOB_LIMIT];
-    if (scene->control[CONTROL_NEXT_JOB] >= limit)
+    const uint limit = scene->counters[COUNTER_JOB_LIMIT];
+    if (scene->counters[COUNTER_NEXT_JOB] >= limit)
         return false;
-    const uint job = atomic_inc(scene->control + CONTROL_NEXT_JOB);
+    const uint job = atomic_inc(scene->counters + COUNTER_NEXT_JOB);
     if (job >= limit) {
-        atomic_dec(scene->control + CONTROL_NEXT_JOB);
+        atomic_dec(scene->counters + COUNTER_NEXT_JOB);
         return false;
     }
     start_job(scene, slot, job);
@@ -150,12 +150,12 @@ INLINE void generate(const Scene *scene, uint group, uint slot)
 /* Slots left idle earlier, now that the limit may have risen. */
 INLINE void wake_idle(const Scene *scene, uint group)
 {
-    if (*idle_counter(scene, group) == 0 || scene->control[CONTROL_NEXT_JOB] >= scene->control[CONTROL_JOB_LIMIT])
+    if (*idle_slots(scene, group) == 0 || scene->counters[COUNTER_NEXT_JOB] >= scene->counters[COUNTER_JOB_LIMIT])
         return;
     for (uint i = get_local_id(0); i < CLVOL_GROUP_SLOTS; i += CLVOL_LOCAL_SIZE) {
         const uint slot = group * CLVOL_GROUP_SLOTS + i;
         if (path_job(scene, slot) == NO_JOB && take_job(scene, group, slot))
-            atomic_dec(idle_counter(scene, group));
+            atomic_dec(idle_slots(scene, group));
     }
 }
 

@@ -2,11 +2,11 @@
 #ifndef CLVOL_STAGES_INTERSECT_H
 #define CLVOL_STAGES_INTERSECT_H
 #include "geometry/bvh.h"
-#include "geometry/interval.h"
+#include "geometry/span.h"
 #if CLVOL_CAMERA_INSIDE
 #include "stages/boundary.h"
 #endif
-#if CLVOL_HAS_STRETCHES
+#if CLVOL_HAS_SEGMENTS
 #include "stages/media.h"
 #endif
 #include "path/ray.h"
@@ -28,7 +28,7 @@ INLINE bool intersect_surfaces(const Scene *scene, uint slot, Ray ray)
                                 ray_limit(scene, slot, ray));
     set_path_hit(scene, slot, &hit);
 #if CLVOL_CAMERA_INSIDE
-    if (path_bounce(scene, slot) == 0 && path_stretch(scene, slot) == 0)
+    if (path_bounce(scene, slot) == 0 && path_segment(scene, slot) == 0)
         set_path_inside(scene, slot, find_inside(scene, ray));
 #endif
     return hit.primitive != NO_PRIMITIVE;
@@ -43,11 +43,11 @@ INLINE void intersect(const Scene *scene, uint group, uint slot)
     if (intersect_surfaces(scene, slot, ray))
         event = EVENT_SURFACE;
 #endif
-#if CLVOL_HAS_STRETCHES
+#if CLVOL_HAS_SEGMENTS
     const Inside inside = path_inside(scene, slot);
-    Part part = {-1, 0.0f, {0.0f, 0.0f, 0.0f}};
-    if (next_part(scene, ray, &inside, path_after_t(scene, slot), stretch_end(scene, slot, ray),
-                  ray_limit(scene, slot, ray), &part)) {
+    MediumSegment segment = {-1, 0.0f, {0.0f, 0.0f, 0.0f}};
+    if (next_medium_segment(scene, ray, &inside, path_after_t(scene, slot), segment_end(scene, slot, ray),
+                  ray_limit(scene, slot, ray), &segment)) {
         to_medium(scene, group, slot, event);
         return;
     }
@@ -55,7 +55,7 @@ INLINE void intersect(const Scene *scene, uint group, uint slot)
     Span span;
     if (medium_span(scene->media, ray, 0.0f, INFINITY, &span) && span_t(&span) < ray_limit(scene, slot, ray)) {
         set_path_origin(scene, slot, span_point(&span, ray));
-        set_path_interval_end(scene, slot, span.end - span.start);
+        set_path_medium_end(scene, slot, span.end - span.start);
         to_medium(scene, group, slot, event);
         return;
     }

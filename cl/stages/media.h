@@ -1,13 +1,13 @@
 /* Which media a ray is in, and where.
 
-   A medium is bounded by an interval of the ray, or by boundaries, of which a path carries one bit each.  It is
-   present as often as boundaries hold it, less those that keep it out (METHODS §6); as often as that its
+   A medium is bounded by a shape, which cuts a span out of the ray, or by boundaries, of which a path carries one bit
+   each.  It is present as often as boundaries hold it, less those that keep it out (METHODS §6); as often as that its
    coefficients count. */
 #ifndef CLVOL_STAGES_MEDIA_H
 #define CLVOL_STAGES_MEDIA_H
 #if CLVOL_HAS_MEDIA
 #include "core/scene.h"
-#include "geometry/interval.h"
+#include "geometry/span.h"
 #include "stages/medium_ray.h"
 
 INLINE int medium_presence(const Scene *scene, uint m, const Inside *inside)
@@ -22,43 +22,45 @@ INLINE int medium_presence(const Scene *scene, uint m, const Inside *inside)
     return presence;
 }
 
-/* The part of the ray between `from` and `to` that lies in medium m; false where there is none. */
-INLINE bool medium_part(const Scene *scene, uint m, Ray ray, const Inside *inside, float from, float to, Span *span)
+/* The segment of the ray between `from` and `to` that lies in medium m; false where there is none. */
+INLINE bool medium_segment(const Scene *scene, uint m, Ray ray, const Inside *inside, float from, float to, Span *span)
 {
     if (CLVOL_BOUNDARY_WORDS > 0 && medium_presence(scene, m, inside) <= 0)
         return false;
     return medium_span(scene->media + m, ray, from, to, span);
 }
 
-/* One medium on a stretch of a ray. */
+/* One medium on a segment of a ray. */
 typedef struct {
     int medium; /* -1: none yet */
     float start; /* ray parameter */
     Span span;
-} Part;
+} MediumSegment;
 
-/* The next part, in the order of entry, ties by number, that begins before `limit`; false at the last. */
-INLINE bool next_part(const Scene *scene, Ray ray, const Inside *inside, float from, float to, float limit, Part *part)
+/* The next one, in the order of entry, ties by number, that begins before `limit`; false at the last. */
+INLINE bool next_medium_segment(const Scene *scene, Ray ray, const Inside *inside, float from, float to, float limit,
+                                MediumSegment *segment)
 {
-    Part next = {-1, limit, {0.0f, limit, limit}};
+    MediumSegment next = {-1, limit, {0.0f, limit, limit}};
     for (int m = 0; m < (int)scene->render->media; ++m) {
         Span span;
-        if (!medium_part(scene, (uint)m, ray, inside, from, to, &span))
+        if (!medium_segment(scene, (uint)m, ray, inside, from, to, &span))
             continue;
         const float t0 = span_t(&span);
-        const bool is_later = part->medium < 0 || t0 > part->start || (t0 == part->start && m > part->medium);
+        const bool is_later =
+            segment->medium < 0 || t0 > segment->start || (t0 == segment->start && m > segment->medium);
         if (is_later && t0 < next.start) {
             next.medium = m;
             next.start = t0;
             next.span = span;
         }
     }
-    *part = next;
+    *segment = next;
     return next.medium >= 0;
 }
 
 /* The medium's coefficients where it is present several times. */
-INLINE MediumRay part_ray(const Scene *scene, const Inside *inside, int m, Ray world, float length, int channel)
+INLINE MediumRay segment_ray(const Scene *scene, const Inside *inside, int m, Ray world, float length, int channel)
 {
     MediumRay in = medium_ray(scene, scene->media + m, world, min_of(length, 1e30f), channel);
 #if CLVOL_BOUNDARY_WORDS > 0
@@ -70,9 +72,9 @@ INLINE MediumRay part_ray(const Scene *scene, const Inside *inside, int m, Ray w
 }
 
 /* Which of the random numbers of a bounce a walk takes. */
-INLINE uint walk_number(const Scene *scene, uint stretch, int m)
+INLINE uint walk_number(const Scene *scene, uint segment, int m)
 {
-    return stretch * scene->render->media + (uint)m;
+    return segment * scene->render->media + (uint)m;
 }
 
 #endif

@@ -60,7 +60,8 @@ INLINE bool medium_collision(const MediumRay *in, uint4 k, Tally *tally, Collisi
 /* Control variate: a walk leaves the path's weight as it is on the mean, so that L (beta before - beta after)
    adds nothing to it for any L that is known before the walk.  With L near what the path will see, the noise
    of the weights all but cancels from the picture; at albedo 1 under a uniform sky it does entirely. */
-INLINE void subtract_background(const Scene *scene, uint slot, __global const Medium *medium, int channel, Spectrum beta)
+INLINE void subtract_background(const Scene *scene, uint slot, __global const Medium *medium, int channel,
+                                Spectrum beta)
 {
     const Spectrum background = to_spectrum(load_vector(medium->background), channel);
     set_path_radiance(scene, slot, path_radiance(scene, slot) + background * (path_beta(scene, slot) - beta));

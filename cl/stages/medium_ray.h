@@ -15,8 +15,8 @@ INLINE MediumRay medium_ray(const Scene *scene, __global const Medium *medium, R
     MediumRay in;
     in.scene = scene;
     in.medium = medium;
-    in.world = world;
-    in.ray = world;
+    in.world_ray = world;
+    in.index_ray = world;
     in.t_max = t_max;
     in.channel = channel;
 #if CLVOL_EXTINCTION == 3
@@ -27,7 +27,7 @@ INLINE MediumRay medium_ray(const Scene *scene, __global const Medium *medium, R
     in.rate = extinction_max(in.scale);
 #if CLVOL_HAS_HETEROGENEOUS
     if (!is_homogeneous(medium))
-        in.ray = transform_ray(scene->volumes[medium->sigma_t_volume].world_to_index, world);
+        in.index_ray = transform_ray(scene->volumes[medium->sigma_t_volume].world_to_index, world);
 #endif
     return in;
 }

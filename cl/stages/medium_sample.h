@@ -2,8 +2,8 @@
 #ifndef CLVOL_STAGES_MEDIUM_SAMPLE_H
 #define CLVOL_STAGES_MEDIUM_SAMPLE_H
 #if CLVOL_HAS_MEDIA
-#if CLVOL_HAS_STRETCHES
-#include "stages/stretch_sample.h"
+#if CLVOL_HAS_SEGMENTS
+#include "stages/segment_sample.h"
 #else
 #include "core/sampler.h"
 #include "path/key.h"
@@ -18,7 +18,7 @@ INLINE uint medium_sample(const Scene *scene, uint group, uint slot)
     const SampleKey key = path_key(scene, slot);
     const Ray ray = path_ray(scene, slot);
     const Walked walked = take_walked(scene, slot, 0.0f);
-    const MediumRay in = rest_of_ray(medium_ray(scene, scene->media, ray, path_interval_end(scene, slot),
+    const MediumRay in = rest_of_ray(medium_ray(scene, scene->media, ray, path_medium_end(scene, slot),
                                                 (int)path_channel(scene, slot)),
                                      walked.t);
     const uint4 k = leg_block(decision_block(scene, key, BLOCK_WALK, 0), walked.leg);

@@ -56,19 +56,20 @@ INLINE Extinction medium_transmittance(const MediumRay *in, uint4 k, Tally *tall
 
 /* Multiplies the transmittance of all media between `from` and `to`; false once nothing is left, or where a walk stops
    short.  Where the walk has legs behind it, it goes on in the medium where it stopped. */
-INLINE bool media_transmittance(const Scene *scene, uint slot, SampleKey key, Ray ray, const Inside *inside, uint stretch,
-                                float from, float to, int channel, Tally *tally, Extinction *transmittance)
+INLINE bool media_transmittance(const Scene *scene, uint slot, SampleKey key, Ray ray, const Inside *inside,
+                                uint segment, float from, float to, int channel, Tally *tally,
+                                Extinction *transmittance)
 {
     Walked walked = take_shadow_walked(scene, slot, from);
     uint m = walked.leg > 0 ? path_shadow_medium(scene, slot) : 0;
     for (; m < (CLVOL_HAS_MANY_MEDIA ? scene->render->media : 1u); ++m, walked.leg = 0, walked.t = from) {
         Span span;
-        if (!medium_part(scene, m, ray, inside, walked.t, to, &span))
+        if (!medium_segment(scene, m, ray, inside, walked.t, to, &span))
             continue;
-        const uint4 block = decision_block(scene, key, BLOCK_SHADOW, walk_number(scene, stretch, (int)m));
+        const uint4 block = decision_block(scene, key, BLOCK_SHADOW, walk_number(scene, segment, (int)m));
         Ray start = ray;
         start.o = span_point(&span, ray);
-        const MediumRay in = part_ray(scene, inside, (int)m, start, span.end - span.start, channel);
+        const MediumRay in = segment_ray(scene, inside, (int)m, start, span.end - span.start, channel);
         *transmittance *= medium_transmittance(&in, leg_block(block, walked.leg), tally);
         if (extinction_max(*transmittance) == 0.0f) {
             tally->stopped = 0;
@@ -127,7 +128,7 @@ INLINE Passed shadow_passed(const Scene *scene, uint slot)
 {
     Passed passed = {0, {0.0f, 0.0f, 0.0f, NO_PRIMITIVE}};
     if (path_shadow_leg(scene, slot) > 0) {
-        passed.count = path_shadow_stretch(scene, slot);
+        passed.count = path_shadow_segment(scene, slot);
         passed.last.t = path_shadow_after_t(scene, slot);
         passed.last.primitive = path_shadow_after_primitive(scene, slot);
     }
@@ -136,7 +137,7 @@ INLINE Passed shadow_passed(const Scene *scene, uint slot)
 
 INLINE void set_shadow_passed(const Scene *scene, uint slot, const Passed *passed)
 {
-    set_path_shadow_stretch(scene, slot, passed->count);
+    set_path_shadow_segment(scene, slot, passed->count);
     set_path_shadow_after_t(scene, slot, passed->last.t);
     set_path_shadow_after_primitive(scene, slot, passed->last.primitive);
 }

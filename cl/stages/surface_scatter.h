@@ -36,9 +36,9 @@ INLINE bool pass_on(const Scene *scene, uint slot, Ray ray, const Hit *hit, cons
     set_path_inside(scene, slot, inside);
     set_path_after_t(scene, slot, hit->t);
     set_path_after_primitive(scene, slot, hit->primitive);
-    const uint stretch = path_stretch(scene, slot) + 1;
-    set_path_stretch(scene, slot, stretch);
-    if (stretch < MOST_PASSED)
+    const uint segment = path_segment(scene, slot) + 1;
+    set_path_segment(scene, slot, segment);
+    if (segment < MOST_PASSED)
         return true;
     set_path_exhausted(scene, slot, path_exhausted(scene, slot) + 1);
     return false;
@@ -140,7 +140,7 @@ INLINE bool shade_surface(const Scene *scene, uint slot, bool *shadow_ray)
     Side side;
     if (!side_of(scene, shape, wi, &side))
         return false;
-    const uint4 k = decision_block(scene, key, BLOCK_SURFACE, path_stretch(scene, slot));
+    const uint4 k = decision_block(scene, key, BLOCK_SURFACE, path_segment(scene, slot));
 #if CLVOL_HAS_PASSABLE
     if (side.material->kind == MATERIAL_NULL)
         return pass_on(scene, slot, ray, &hit, &surface);

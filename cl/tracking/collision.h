@@ -27,7 +27,8 @@ INLINE bool real_collision(float t, Tally *tally, Collision *collision)
 INLINE void collect_emission(const MediumRay *in, float t, Spectrum beta, Collision *collision)
 {
 #if CLVOL_EMISSION_ON_WALKS
-    collision->emission += beta * medium_source(in->scene, in->medium, in->world.o + t * in->world.d, in->channel);
+    const float3 p = in->world_ray.o + t * in->world_ray.d;
+    collision->emission += beta * medium_source(in->scene, in->medium, p, in->channel);
 #endif
 }
 

@@ -14,13 +14,13 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
         const float majorant = flight.walk.majorant;
         const float control = cell_extinction(in, cell_row(in, in->scene->controls, flight.walk.cell, 0));
         const float residual = majorant - control;
-        const float t = stretch_t(&flight.stretch);
+        const float t = segment_t(&flight.segment);
         const uint2 choice = stream_pair(stream);
         if (choose_event(choice.x, control, residual)) {
             collect_emission(in, t, collision->beta, collision); /* sigma_c / (sigma_maj P_c) = 1 */
             return real_collision(t, tally, collision);
         }
-        const float sigma_t = stretch_extinction(in, &flight.stretch, stream, tally);
+        const float sigma_t = segment_extinction(in, &flight.segment, stream, tally);
         tally->violations += sigma_t > majorant || sigma_t < control ? 1 : 0;
         const float sigma_r = sigma_t - control;
         collect_emission(in, t, collision->beta * (sigma_r / residual), collision);

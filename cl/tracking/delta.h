@@ -10,8 +10,8 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
     Flight flight = flight_begin(in, first);
     while (flight_next(in, &flight, tally)) {
         const float majorant = flight.walk.majorant;
-        const float t = stretch_t(&flight.stretch);
-        const float sigma_t = stretch_extinction(in, &flight.stretch, stream, tally);
+        const float t = segment_t(&flight.segment);
+        const float sigma_t = segment_extinction(in, &flight.segment, stream, tally);
         tally->violations += sigma_t > majorant ? 1 : 0;
         collect_emission(in, t, collision->beta * (sigma_t / majorant), collision);
         const uint2 k = stream_pair(stream);

@@ -9,7 +9,7 @@ INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream
     Flight flight = flight_begin(in, first);
     while (flight_next(in, &flight, tally)) {
         const float majorant = flight.walk.majorant;
-        const Extinction sigma_t = stretch_extinction(in, &flight.stretch, stream, tally);
+        const Extinction sigma_t = segment_extinction(in, &flight.segment, stream, tally);
         const Extinction sigma_n = majorant - sigma_t;
         tally->violations += extinction_max(sigma_t) > majorant ? 1 : 0;
         const uint2 k = stream_pair(stream);

@@ -8,7 +8,7 @@
 /* A walk of rate sigma_maj, from tentative collision to tentative collision through all cells. */
 typedef struct {
     MajorantWalk walk;
-    Stretch stretch;
+    Segment segment;
     float depth; /* still to go; the tracker draws it anew at each tentative collision */
     uint steps;  /* still allowed */
 } Flight;
@@ -17,7 +17,7 @@ INLINE Flight flight_begin(const MediumRay *in, uint first)
 {
     Flight flight;
     flight.walk = majorant_begin(in);
-    flight.stretch = stretch_of(in, 0.0f, 0.0f, 0.0f); /* empty: the first cell is still to be entered */
+    flight.segment = segment_of(in, 0.0f, 0.0f, 0.0f); /* empty: the first cell is still to be entered */
     flight.depth = exponential_variate(first);
     flight.steps = WALK_STEPS;
     return flight;
@@ -27,13 +27,13 @@ INLINE Flight flight_begin(const MediumRay *in, uint first)
 INLINE bool flight_next(const MediumRay *in, Flight *flight, Tally *tally)
 {
     if (flight->steps-- == 0) {
-        stop_walk(stretch_t(&flight->stretch), tally);
+        stop_walk(segment_t(&flight->segment), tally);
         return false;
     }
-    while (!next_tentative(&flight->stretch, &flight->depth, tally)) {
+    while (!next_tentative(&flight->segment, &flight->depth, tally)) {
         if (!majorant_next(in, &flight->walk))
             return false;
-        flight->stretch = stretch_of(in, flight->walk.t, flight->walk.t_end, flight->walk.majorant);
+        flight->segment = segment_of(in, flight->walk.t, flight->walk.t_end, flight->walk.majorant);
         tally->cells += 1;
     }
     return true;

@@ -7,14 +7,14 @@
 #include "tracking/collision.h"
 
 #if CLVOL_EMISSION_ON_WALKS
-/* Density, but for the factor T, of a collision that is forced to lie in a stretch, which catches the share
+/* Density, but for the factor T, of a collision that is forced to lie in a segment, which catches the share
    `caught` of all. */
 INLINE float forced_density(float sigma_t, float caught, float length)
 {
     return caught > 0.0f ? sigma_t / caught : 1.0f / length; /* times T */
 }
 
-/* Emission of the stretch, at a collision that is forced to lie in it: sigma_a L_e / sigma_t times 1 - T.  It has
+/* Emission of the segment, at a collision that is forced to lie in it: sigma_a L_e / sigma_t times 1 - T.  It has
    no variance where L_e is constant, and a finite relative variance however thin the medium is.  `first` also decides
    the flight, which is the same in thick media.  Several channels are weighted over their mixture. */
 INLINE Spectrum forced_emission(const MediumRay *in, uint first, int channel, Spectrum beta)
@@ -36,7 +36,7 @@ INLINE Spectrum forced_emission(const MediumRay *in, uint first, int channel, Sp
 #else
     beta *= caught;
 #endif
-    return beta * medium_source(in->scene, in->medium, in->world.o + t * in->world.d, in->channel);
+    return beta * medium_source(in->scene, in->medium, in->world_ray.o + t * in->world_ray.d, in->channel);
 }
 #endif
 

@@ -1,4 +1,4 @@
-/* What a technique is: two functions over the part of a ray that lies in one medium.
+/* What a technique is: two functions over the segment of a ray that lies in one medium.
 
        bool sample_collision(medium_ray, first, stream, tally, &collision)
        Extinction estimate_transmittance(medium_ray, first, stream, tally)
@@ -23,12 +23,12 @@
 #define WALK_STEPS (1u << 12)
 #define WALK_LEGS (1u << 14)
 
-/* The stretch 0 <= t <= t_max of a ray that lies in one medium, t in world lengths. */
+/* The segment 0 <= t <= t_max of a ray that lies in one medium, t in world lengths. */
 typedef struct {
     const Scene *scene;
     __global const Medium *medium;
-    Ray ray;          /* in the index space of sigma_t, where one is */
-    Ray world;        /* the same in world space */
+    Ray index_ray;    /* in the index space of sigma_t, where one is */
+    Ray world_ray;    /* the same in world space */
     float t_max;
     int channel;      /* the one followed, where a path follows one */
     Extinction scale; /* sigma_t = scale * density; the coefficient itself where it is constant */
@@ -44,8 +44,8 @@ INLINE void stop_walk(float t, Tally *tally)
 /* What is left of a ray from t on. */
 INLINE MediumRay rest_of_ray(MediumRay in, float t)
 {
-    in.ray.o += t * in.ray.d;
-    in.world.o += t * in.world.d;
+    in.index_ray.o += t * in.index_ray.d;
+    in.world_ray.o += t * in.world_ray.d;
     in.t_max -= t;
     return in;
 }

@@ -13,7 +13,8 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
         if (!(t < in->t_max))
             return false;
         const float length = min_of(step, in->t_max - t);
-        const float sigma_t = extinction_at(in, in->ray.o + (t + jitter * length) * in->ray.d, stream, tally);
+        const float3 p = in->index_ray.o + (t + jitter * length) * in->index_ray.d;
+        const float sigma_t = extinction_at(in, p, stream, tally);
         if (sigma_t * length > depth) {
             const float hit = t + depth / sigma_t;
             collect_emission(in, hit, collision->beta, collision);

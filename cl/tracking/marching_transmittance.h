@@ -10,7 +10,7 @@ INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream
         if (!(t < in->t_max))
             return exp_of_minus(depth);
         const float length = min_of(step, in->t_max - t);
-        depth += length * extinction_at(in, in->ray.o + (t + jitter * length) * in->ray.d, stream, tally);
+        depth += length * extinction_at(in, in->index_ray.o + (t + jitter * length) * in->index_ray.d, stream, tally);
     }
     stop_walk((float)WALK_STEPS * step, tally);
     return exp_of_minus(depth);

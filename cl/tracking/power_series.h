@@ -46,7 +46,7 @@ INLINE Extinction comb_estimate(const MediumRay *in, float offset, float step, S
         tally->cells += 1;
         for (uint n = 1; at < whole; ++n) {
             const float t = walk.t + min_of(at / walk.majorant, length);
-            const Extinction sigma_t = extinction_at(in, in->ray.o + t * in->ray.d, stream, tally);
+            const Extinction sigma_t = extinction_at(in, in->index_ray.o + t * in->index_ray.d, stream, tally);
             tally->violations += extinction_max(sigma_t) > walk.majorant ? 1 : 0;
             tally->tentative += 1;
             sum += sigma_t;

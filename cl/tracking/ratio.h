@@ -10,13 +10,13 @@ INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream
     Flight flight = flight_begin(in, first);
     while (flight_next(in, &flight, tally)) {
         const float majorant = flight.walk.majorant;
-        const Extinction sigma_t = stretch_extinction(in, &flight.stretch, stream, tally);
+        const Extinction sigma_t = segment_extinction(in, &flight.segment, stream, tally);
         tally->violations += extinction_max(sigma_t) > majorant ? 1 : 0;
         transmittance *= (majorant - sigma_t) / majorant;
         const uint2 k = stream_pair(stream);
         if (!transmittance_survives(&transmittance, k.x))
             return (Extinction)(0.0f);
-        RECORD_ESTIMATE(stretch_t(&flight.stretch), transmittance, tally);
+        RECORD_ESTIMATE(segment_t(&flight.segment), transmittance, tally);
         flight.depth = exponential_variate(k.y);
     }
     return transmittance;

@@ -1,4 +1,4 @@
-/* Regular tracking: the free flight by inverting the exact optical depth, piece by piece; no tentative
+/* Regular tracking: the free flight by inverting the exact optical depth, segment by segment; no tentative
    collisions, no noise but that of the distance itself (Sutton et al. 1999; METHODS §3).
 
    Emission is gathered at the collision, but along the way where the medium is thin.
@@ -40,10 +40,10 @@ INLINE float invert_cubic(const Cubic *cubic, int channel, float target)
    a collision to gather it at.  Beyond, collisions gather it with less noise. */
 #define TRACK_DEPTH 0.01f
 
-/* The pieces of a flight that end within TRACK_DEPTH, of which one is drawn in proportion to its optical depth. */
+/* The segments of a flight that end within TRACK_DEPTH, of which one is drawn in proportion to its optical depth. */
 typedef struct {
     float total;     /* of their optical depths */
-    float t, length; /* the piece drawn, as far as the flight goes */
+    float t, length; /* the segment drawn, as far as the flight goes */
     float part;      /* its optical depth */
     Extinction depth; /* up to it */
 } Track;
@@ -72,8 +72,8 @@ INLINE void gather_track(const MediumRay *in, const Track *track, Stream *stream
     if (!(track->total > 0.0f))
         return;
     const float t = track->t + uniform_float(stream_pair(stream).x) * track->length;
-    const float3 start = in->ray.o + track->t * in->ray.d;
-    const Extinction sigma_t = extinction_at(in, in->ray.o + t * in->ray.d, stream, tally);
+    const float3 start = in->index_ray.o + track->t * in->index_ray.d;
+    const Extinction sigma_t = extinction_at(in, in->index_ray.o + t * in->index_ray.d, stream, tally);
     Spectrum beta = collision->beta;
 #if CLVOL_EXTINCTION == 3
     LatticeWalk flown;
@@ -96,19 +96,19 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
         tally->cells += 1;
         if (walk.majorant == 0.0f)
             continue;
-        const float3 start = in->ray.o + walk.t * in->ray.d;
-        LatticeWalk piece = segments_begin(in, walk.t, walk.t_end);
-        while (lattice_next(&piece)) {
-            const Extinction part = segment_depth(in, start, &piece, stream, tally);
+        const float3 start = in->index_ray.o + walk.t * in->index_ray.d;
+        LatticeWalk segment = segments_begin(in, walk.t, walk.t_end);
+        while (lattice_next(&segment)) {
+            const Extinction part = segment_depth(in, start, &segment, stream, tally);
             if (channel_of(depth + part, channel) >= target) {
-                const Cubic cubic = segment_cubic(in, start, &piece, stream, tally);
-                const float unit = 0.125f * (piece.t_end - piece.t);
+                const Cubic cubic = segment_cubic(in, start, &segment, stream, tally);
+                const float unit = 0.125f * (segment.t_end - segment.t);
                 const float w = invert_cubic(&cubic, channel, (target - channel_of(depth, channel)) / unit);
-                const float t = walk.t + piece.t + w * unit;
+                const float t = walk.t + segment.t + w * unit;
                 const Extinction integral = cubic_integral(&cubic, w);
                 const bool tracked = is_tracked(depth + part);
                 if (tracked)
-                    track_add(&track, walk.t + piece.t, w * unit, depth, unit * integral, stream);
+                    track_add(&track, walk.t + segment.t, w * unit, depth, unit * integral, stream);
                 gather_track(in, &track, stream, tally, collision);
                 depth += unit * integral;
                 collision->beta = balanced(collision->beta, cubic_value(&cubic, w), depth);
@@ -118,10 +118,10 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
                 return real_collision(t, tally, collision);
             }
             if (is_tracked(depth + part))
-                track_add(&track, walk.t + piece.t, piece.t_end - piece.t, depth, part, stream);
+                track_add(&track, walk.t + segment.t, segment.t_end - segment.t, depth, part, stream);
             depth += part;
             if (--steps == 0) {
-                stop_walk(walk.t + piece.t_end, tally);
+                stop_walk(walk.t + segment.t_end, tally);
                 break;
             }
         }

@@ -1,4 +1,4 @@
-/* Regular transmittance: the exact optical depth, piece by piece, no variance (METHODS §4).  The majorant only
+/* Regular transmittance: the exact optical depth, segment by segment, no variance (METHODS §4).  The majorant only
    tells where the medium is empty. */
 #include "density/segments.h"
 #include "majorant/majorant.h"
@@ -13,12 +13,12 @@ INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream
         tally->cells += 1;
         if (walk.majorant == 0.0f)
             continue;
-        const float3 start = in->ray.o + walk.t * in->ray.d;
-        LatticeWalk piece = segments_begin(in, walk.t, walk.t_end);
-        while (lattice_next(&piece)) {
-            depth += segment_depth(in, start, &piece, stream, tally);
+        const float3 start = in->index_ray.o + walk.t * in->index_ray.d;
+        LatticeWalk segment = segments_begin(in, walk.t, walk.t_end);
+        while (lattice_next(&segment)) {
+            depth += segment_depth(in, start, &segment, stream, tally);
             if (--steps == 0) {
-                stop_walk(walk.t + piece.t_end, tally);
+                stop_walk(walk.t + segment.t_end, tally);
                 return exp_of_minus(depth);
             }
         }

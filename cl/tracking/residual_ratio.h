@@ -8,7 +8,7 @@
 #include "tracking/transmittance.h"
 
 /* Optical depth of the control beyond which it is paid into the estimate: roulette has to see it, and over
-   long stretches the product alone would run over. */
+   long segments the product alone would run over. */
 #define CONTROL_DEPTH 2.0f
 
 INLINE void pay_control(Extinction *transmittance, Extinction *control_depth)
@@ -28,26 +28,26 @@ INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream
     while (majorant_next(in, &walk)) {
         __global const float *row = cell_row(in, in->scene->residuals, walk.cell, 1);
         const Extinction control = cell_extinction(in, row);
-        Stretch stretch = stretch_of(in, walk.t, walk.t_end, in->rate * row[CLVOL_DENSITY_CHANNELS]);
-        float paid = 0.0f; /* part of the stretch whose control is in control_depth */
+        Segment segment = segment_of(in, walk.t, walk.t_end, in->rate * row[CLVOL_DENSITY_CHANNELS]);
+        float paid = 0.0f; /* part of the segment whose control is in control_depth */
         tally->cells += 1;
-        while (next_tentative(&stretch, &depth, tally)) {
-            const Extinction sigma_t = stretch_extinction(in, &stretch, stream, tally);
-            transmittance *= 1.0f - (sigma_t - control) / stretch.rate;
-            control_depth += control * (stretch.t - paid);
-            paid = stretch.t;
+        while (next_tentative(&segment, &depth, tally)) {
+            const Extinction sigma_t = segment_extinction(in, &segment, stream, tally);
+            transmittance *= 1.0f - (sigma_t - control) / segment.rate;
+            control_depth += control * (segment.t - paid);
+            paid = segment.t;
             pay_control(&transmittance, &control_depth);
             const uint2 k = stream_pair(stream);
             if (!transmittance_survives(&transmittance, k.x))
                 return (Extinction)(0.0f);
-            RECORD_ESTIMATE(stretch_t(&stretch), transmittance * exp_of_minus(control_depth), tally);
+            RECORD_ESTIMATE(segment_t(&segment), transmittance * exp_of_minus(control_depth), tally);
             if (--steps == 0) {
-                stop_walk(stretch_t(&stretch), tally);
+                stop_walk(segment_t(&segment), tally);
                 return transmittance * exp_of_minus(control_depth);
             }
             depth = exponential_variate(k.y);
         }
-        control_depth += control * (stretch.length - paid);
+        control_depth += control * (segment.length - paid);
         pay_control(&transmittance, &control_depth);
         if (!transmittance_survives(&transmittance, stream_pair(stream).x))
             return (Extinction)(0.0f);

@@ -1,12 +1,12 @@
-/* Emission of a stretch so thin that hardly a walk meets an event in it: gathered at one point of the stretch, drawn
+/* Emission of a segment so thin that hardly a walk meets an event in it: gathered at one point of the segment, drawn
    evenly, instead of at tentative collisions.
 
-   Estimates the integral of T sigma_a L_e over the stretch, with the transmittance to the point by ratio tracking
+   Estimates the integral of T sigma_a L_e over the segment, with the transmittance to the point by ratio tracking
    under the medium's global bound: unbiased for any bound, and of finite relative variance however thin.
 
    A walk that stops short leaves what is beyond to its next leg, and one that collides before where it would have
    stopped must not count that part, or it would count twice.  It never does: one number places the point, evenly, and
-   decides the flight, and 1 - T at a place is at most THIN_DEPTH of its share of the stretch.  So a flight that
+   decides the flight, and 1 - T at a place is at most THIN_DEPTH of its share of the segment.  So a flight that
    collides has its point before any place that it did not get to; for this the bound has to hold. */
 #ifndef CLVOL_TRACKING_THIN_EMISSION_H
 #define CLVOL_TRACKING_THIN_EMISSION_H
@@ -16,9 +16,9 @@
 #include "tracking/collision.h"
 #include "tracking/walk.h"
 
-/* Optical depth under the global bound up to which a stretch is thin: ratio tracking then seldom looks up. */
+/* Optical depth under the global bound up to which a segment is thin: ratio tracking then seldom looks up. */
 #define THIN_DEPTH 0.3f
-/* Tentative collisions before the point, of which most stretches have none, beyond which an estimate is given up. */
+/* Tentative collisions before the point, of which most segments have none, beyond which an estimate is given up. */
 #define THIN_BUDGET 64u
 
 INLINE float global_rate(const MediumRay *in)
@@ -45,15 +45,15 @@ INLINE Spectrum thin_emission(const MediumRay *in, uint first, Stream *stream, T
         return (Spectrum)(0.0f);
     float at = exponential_variate(stream_pair(stream).x) / rate;
     for (uint n = 0; at < t; ++n) {
-        beta *= 1.0f - extinction_at(in, in->ray.o + at * in->ray.d, stream, tally) / rate;
+        beta *= 1.0f - extinction_at(in, in->index_ray.o + at * in->index_ray.d, stream, tally) / rate;
         at += exponential_variate(stream_pair(stream).x) / rate;
         if (n == THIN_BUDGET) {
             tally->exhausted += 1;
             return (Spectrum)(0.0f);
         }
     }
-    const Extinction depth = extinction_at(in, in->ray.o + t * in->ray.d, stream, tally) * in->t_max;
-    return beta * depth * medium_source(in->scene, in->medium, in->world.o + t * in->world.d, in->channel);
+    const Extinction depth = extinction_at(in, in->index_ray.o + t * in->index_ray.d, stream, tally) * in->t_max;
+    return beta * depth * medium_source(in->scene, in->medium, in->world_ray.o + t * in->world_ray.d, in->channel);
 }
 
 #endif

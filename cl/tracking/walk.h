@@ -10,33 +10,33 @@
 #include "tracking/probability.h"
 #include "tracking/record.h"
 
-/* The part of a ray inside one cell, and where on it the walk stands. */
+/* The segment of a ray inside one majorant cell, and where on it the walk stands. */
 typedef struct {
     float3 start;
     float begin; /* ray parameter of the start */
     float length;
     float rate; /* of tentative collisions, per world length */
     float t;    /* from the start */
-} Stretch;
+} Segment;
 
-INLINE Stretch stretch_of(const MediumRay *in, float t, float t_end, float rate)
+INLINE Segment segment_of(const MediumRay *in, float t, float t_end, float rate)
 {
-    Stretch stretch = {in->ray.o + t * in->ray.d, t, t_end - t, rate, 0.0f};
-    return stretch;
+    Segment segment = {in->index_ray.o + t * in->index_ray.d, t, t_end - t, rate, 0.0f};
+    return segment;
 }
 
-/* Moves on by the optical depth still to go, to the next tentative collision; false when the stretch ends
+/* Moves on by the optical depth still to go, to the next tentative collision; false when the segment ends
    before, with the rest in `depth`. */
-INLINE bool next_tentative(Stretch *stretch, float *depth, Tally *tally)
+INLINE bool next_tentative(Segment *segment, float *depth, Tally *tally)
 {
-    const float left = (stretch->length - stretch->t) * stretch->rate;
+    const float left = (segment->length - segment->t) * segment->rate;
     if (*depth >= left) {
         *depth -= left;
         return false;
     }
-    stretch->t += *depth / stretch->rate;
+    segment->t += *depth / segment->rate;
     tally->tentative += 1;
-    RECORD_TENTATIVE(stretch->begin + stretch->t, stretch->rate, tally);
+    RECORD_TENTATIVE(segment->begin + segment->t, segment->rate, tally);
     return true;
 }
 
@@ -54,13 +54,13 @@ INLINE Extinction extinction_at(const MediumRay *in, float3 p, Stream *stream, T
     return sigma_t;
 }
 
-/* sigma_t where the stretch, or the flight, stands. */
-INLINE Extinction stretch_extinction(const MediumRay *in, const Stretch *at, Stream *stream, Tally *tally)
+/* sigma_t where the segment, or the flight, stands. */
+INLINE Extinction segment_extinction(const MediumRay *in, const Segment *at, Stream *stream, Tally *tally)
 {
-    return extinction_at(in, at->start + at->t * in->ray.d, stream, tally);
+    return extinction_at(in, at->start + at->t * in->index_ray.d, stream, tally);
 }
 
-INLINE float stretch_t(const Stretch *at)
+INLINE float segment_t(const Segment *at)
 {
     return at->begin + at->t;
 }

@@ -14,8 +14,8 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
     Flight flight = flight_begin(in, first);
     while (flight_next(in, &flight, tally)) {
         const float majorant = flight.walk.majorant;
-        const float t = stretch_t(&flight.stretch);
-        const Extinction sigma_t = stretch_extinction(in, &flight.stretch, stream, tally);
+        const float t = segment_t(&flight.segment);
+        const Extinction sigma_t = segment_extinction(in, &flight.segment, stream, tally);
         const Extinction sigma_n = majorant - sigma_t;
         tally->violations += extinction_max(sigma_t) > majorant ? 1 : 0;
         collect_emission(in, t, beta * (sigma_t / majorant), collision);

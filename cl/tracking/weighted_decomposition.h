@@ -15,7 +15,7 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
     while (flight_next(in, &flight, tally)) {
         const float majorant = flight.walk.majorant;
         const Extinction control = cell_extinction(in, cell_row(in, in->scene->controls, flight.walk.cell, 0));
-        const float t = stretch_t(&flight.stretch);
+        const float t = segment_t(&flight.segment);
         const uint2 choice = stream_pair(stream);
         const float part = event_rate(beta, control), rest = event_rate(beta, majorant - control);
         if (!(part + rest > 0.0f))
@@ -25,7 +25,7 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
             collect_emission(in, t, collision->beta, collision);
             return real_collision(t, tally, collision);
         }
-        const Extinction sigma_t = stretch_extinction(in, &flight.stretch, stream, tally);
+        const Extinction sigma_t = segment_extinction(in, &flight.segment, stream, tally);
         const Extinction sigma_r = sigma_t - control, sigma_n = majorant - sigma_t;
         tally->violations += extinction_max(sigma_t) > majorant ? 1 : 0;
         beta *= (part + rest) / rest;

@@ -22,9 +22,9 @@ from clvol.layout.constants import (
     BVH_STACK,
     BVH_WIDTH,
     COAT_ENTRIES,
-    COUNTER_STRIDE,
     NO_JOB,
     NO_PRIMITIVE,
+    QUEUE_LENGTHS_STRIDE,
     RANDOMIZATIONS,
 )
 from clvol.layout.path_state import (
@@ -79,7 +79,6 @@ __all__ = [
     "BVH_STACK",
     "BVH_WIDTH",
     "COAT_ENTRIES",
-    "COUNTER_STRIDE",
     "COUNTS",
     "EMITTER",
     "ENUMS",
@@ -94,6 +93,7 @@ __all__ = [
     "PHASE",
     "QUADRIC",
     "QUEUES",
+    "QUEUE_LENGTHS_STRIDE",
     "RANDOMIZATIONS",
     "RECORDS",
     "RENDER",

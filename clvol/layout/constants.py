@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-COUNTER_STRIDE = 16
+QUEUE_LENGTHS_STRIDE = 16
 """Queue counters of a group, padded to a cache line."""
 
 NO_JOB = 0xFFFFFFFF

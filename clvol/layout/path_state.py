@@ -116,11 +116,11 @@ PATH_STATE: tuple[Declared, ...] = (
     Declared("medium", "i", "medium of the collision", ("CLVOL_HAS_MANY_MEDIA",)),
     *_legs("", _WALKS),
     Declared(
-        "interval_end",
+        "medium_end",
         "f",
         "ray parameter where the walk ends",
         ("CLVOL_HAS_MEDIA",),
-        unless="CLVOL_HAS_STRETCHES",
+        unless="CLVOL_HAS_SEGMENTS",
     ),
     Declared(
         "hit_t",
@@ -132,7 +132,7 @@ PATH_STATE: tuple[Declared, ...] = (
     Declared("hit_primitive", "u", "primitive that was hit", ("CLVOL_HAS_SURFACES",), absent="NO_PRIMITIVE"),
     Declared("hit_u", "f", "where on it", ("CLVOL_HAS_TRIANGLES",)),
     Declared("hit_v", "f", "where on it", ("CLVOL_HAS_TRIANGLES",)),
-    Declared("stretch", "u", "surfaces passed since the last scattering", ("CLVOL_HAS_PASSABLE",)),
+    Declared("segment", "u", "surfaces passed since the last scattering", ("CLVOL_HAS_PASSABLE",)),
     Declared("after_t", "f", "ray parameter of the last surface passed", ("CLVOL_HAS_PASSABLE",)),
     Declared(
         "after_primitive",
@@ -182,7 +182,7 @@ PATH_STATE: tuple[Declared, ...] = (
     Declared("goes_on", "u", "1: the path goes on when its shadow ray is through; 0: it has ended", (_NEE,)),
     *_legs("shadow_", _NEE, _WALKS),
     Declared("shadow_medium", "u", "medium it is in", (_NEE, _WALKS, "CLVOL_HAS_MANY_MEDIA")),
-    Declared("shadow_stretch", "u", "surfaces that it has passed", (_NEE, _WALKS, "CLVOL_HAS_PASSABLE")),
+    Declared("shadow_segment", "u", "surfaces that it has passed", (_NEE, _WALKS, "CLVOL_HAS_PASSABLE")),
     Declared(
         "shadow_after_t",
         "f",

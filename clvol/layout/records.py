@@ -199,7 +199,7 @@ ENUMS = {
     "WRAP": ("REPEAT", "MIRROR", "CLAMP"),
     "ABSORPTION": ("SAMPLE", "WEIGHT", "MIXED"),
     "PROBABILITY": ("HISTORY", "AVERAGE", "MAX"),
-    "CONTROL": ("NEXT_JOB", "JOB_LIMIT", "NON_FINITE", "DONE"),  # DONE: one counter per pass in the ring
+    "COUNTER": ("NEXT_JOB", "JOB_LIMIT", "NON_FINITE", "DONE"),  # DONE: one counter per pass in the ring
 }
 
 

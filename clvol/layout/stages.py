@@ -126,12 +126,12 @@ _KEY = "pixel sample bounce"  # of random numbers
 _COUNTS = "lookups tentative real cells violations"
 _FIRST_HIT = "depth normal albedo position met"
 _HIT = "hit_t hit_primitive hit_u hit_v"
-_PASSED = "stretch after_t after_primitive"
+_PASSED = "segment after_t after_primitive"
 _LEG = "leg walked walked_rest"
 _SHADOW_RAY = "shadow_direction shadow_distance shadow_primitive shadow_origin shadow_inside shadow_light"
 _SHADOW_LEG = (
     "shadow_leg shadow_walked shadow_walked_rest shadow_medium "
-    "shadow_stretch shadow_after_t shadow_after_primitive"
+    "shadow_segment shadow_after_t shadow_after_primitive"
 )
 
 STAGES = (
@@ -168,7 +168,7 @@ STAGES = (
             Transition("SHADE", "none do", sets="event", events=("ESCAPE", "SURFACE")),
         ),
         reads=_fields(_RAY, _PASSED, "bounce inside hit_t"),
-        writes=_fields(_HIT, "inside origin interval_end"),
+        writes=_fields(_HIT, "inside origin medium_end"),
     ),
     Stage(
         "medium_sample",
@@ -187,7 +187,7 @@ STAGES = (
             _KEY,
             _COUNTS,
             _LEG,
-            "event channel beta radiance inside stretch after_t hit_t interval_end largest_weight exhausted",
+            "event channel beta radiance inside segment after_t hit_t medium_end largest_weight exhausted",
         ),
         writes=_fields(_COUNTS, _LEG, "origin medium beta radiance largest_weight exhausted"),
         needs="CLVOL_HAS_MEDIA",
@@ -219,7 +219,7 @@ STAGES = (
             _RAY,
             _KEY,
             _HIT,
-            "event goes_on channel beta radiance pdf medium stretch inside eta_squared sample_weight",
+            "event goes_on channel beta radiance pdf medium segment inside eta_squared sample_weight",
             "largest_weight cut cut_energy exhausted",
         ),
         writes=_fields(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from clvol.layout.arguments import ARGUMENTS, arguments
-from clvol.layout.constants import BLACKBODY_BINS, BLACKBODY_MIDDLE_KELVIN, COUNTER_STRIDE
+from clvol.layout.constants import BLACKBODY_BINS, BLACKBODY_MIDDLE_KELVIN, QUEUE_LENGTHS_STRIDE
 from clvol.layout.path_state import (
     Macros,
     counts_per_path,
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 def layout_text(macros: Macros, stage: Stage | None = None) -> str:
     """OpenCL text of arguments, and of what a stage may do with paths (None: anything): cl/core/scene.h."""
-    parts = [f"#define QUEUE_COUNT {len(QUEUES)}", f"#define COUNTER_STRIDE {COUNTER_STRIDE}u"]
+    parts = [f"#define QUEUE_COUNT {len(QUEUES)}", f"#define QUEUE_LENGTHS_STRIDE {QUEUE_LENGTHS_STRIDE}u"]
     parts += _scene_text(macros)
     parts += [
         f"#define CLVOL_PATH_COUNTS {len(path_counts(macros))}u",

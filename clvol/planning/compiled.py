@@ -25,7 +25,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_ONE_CHANNEL_PER_PATH": int(plan.one_channel_per_path),
         "CLVOL_HAS_MEDIA": int(f.media > 0),
         "CLVOL_HAS_MANY_MEDIA": int(f.media > 1),
-        "CLVOL_HAS_STRETCHES": int(f.stretches),
+        "CLVOL_HAS_SEGMENTS": int(f.segments),
         "CLVOL_HAS_OVERLAP": int(f.media_overlap),
         "CLVOL_HAS_HOMOGENEOUS": int(f.homogeneous),
         "CLVOL_HAS_HETEROGENEOUS": int(f.heterogeneous),

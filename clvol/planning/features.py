@@ -78,8 +78,8 @@ class Features:
         return self.point_lights or self.spot or self.area
 
     @property
-    def stretches(self) -> bool:
-        """A ray is walked stretch by stretch, from surface to surface or through several media."""
+    def segments(self) -> bool:
+        """A ray is walked segment by segment, from surface to surface or through several media."""
         return self.media > 1 or (self.media > 0 and self.surfaces > 0)
 
     @property

@@ -24,7 +24,7 @@ from clvol.planning.plan import Plan
 from clvol.rendering.film import Film
 
 log = logging.getLogger("clvol")
-_NEXT_JOB, _JOB_LIMIT, _NON_FINITE, _DONE = (layout.enum("CONTROL", n) for n in layout.ENUMS["CONTROL"])
+_NEXT_JOB, _JOB_LIMIT, _NON_FINITE, _DONE = (layout.enum("COUNTER", n) for n in layout.ENUMS["COUNTER"])
 _MAX_ROUND_JOBS = 1 << 31
 _HARVEST_SECONDS = 2.0
 """Statistics of the slots are collected at least this often: their 32-bit counters must not run over."""
@@ -105,8 +105,8 @@ class Wavefront:
             "render": self.render.nbytes,
             "state": 4 * len(self.fields) * self.stride,
             "queues": 4 * len(layout.QUEUES) * self.pool.slots,
-            "counts": 4 * layout.COUNTER_STRIDE * self.groups,
-            "control": 4 * (_DONE + self.pool.ring_passes),
+            "queue_lengths": 4 * layout.QUEUE_LENGTHS_STRIDE * self.groups,
+            "counters": 4 * (_DONE + self.pool.ring_passes),
             "results": 4 * self.plan.channels * ring_jobs // self.plan.jobs_per_sample,
         }
         if self.film.firsts:
@@ -120,7 +120,7 @@ class Wavefront:
         state = np.zeros((len(self.fields), self.stride), np.uint32)
         state[[f.name for f in self.fields].index("job")] = layout.NO_JOB
         self._write("state", state)
-        self._write("control", np.zeros(_DONE + self.pool.ring_passes, np.uint32))
+        self._write("counters", np.zeros(_DONE + self.pool.ring_passes, np.uint32))
         values = scene_arguments(self.plan.macros, self.buffers, self.stride)
         for stage in self.plan.stages:
             set_arguments(self.kernels[stage], *values)
@@ -130,7 +130,7 @@ class Wavefront:
         """Forget every sample and what was counted; the next run draws the random numbers of another seed."""
         self._harvest()
         self.film.clear(seed)
-        self._write("control", np.zeros(_DONE + self.pool.ring_passes, np.uint32))
+        self._write("counters", np.zeros(_DONE + self.pool.ring_passes, np.uint32))
         self._reset_clocks()
 
     def new_film(self, seed: tuple[int, int]) -> Film:
@@ -216,16 +216,16 @@ class Wavefront:
             urgency = should_stop() if begun else 0
             allowed = begun if urgency else min(passes, finished + self.pool.ring_passes)
             limit = sum(samples[:allowed]) * self.sample_jobs
-            self._write("control", np.array([limit], np.uint32), 4 * _JOB_LIMIT)
+            self._write("counters", np.array([limit], np.uint32), 4 * _JOB_LIMIT)
             launched, elapsed = self._launch(waves)
             waves = int(np.clip(launched * _BATCH_SECONDS / max(elapsed, 1e-6), 1, max(2 * launched, 4)))
             if time.perf_counter() - self._harvested > _HARVEST_SECONDS:
                 self._harvest()
-            control = self._read_control()
-            begun = min(allowed, -(-int(control[_NEXT_JOB]) // pass_jobs))
+            counters = self._read_counters()
+            begun = min(allowed, -(-int(counters[_NEXT_JOB]) // pass_jobs))
             while finished < begun:
                 place = finished % self.pool.ring_passes
-                if control[_DONE + place] != samples[finished] * self.sample_jobs:
+                if counters[_DONE + place] != samples[finished] * self.sample_jobs:
                     break
                 self._accumulate(place, samples[finished], first + finished * self.pass_samples)
                 finished += 1
@@ -269,12 +269,12 @@ class Wavefront:
         self.render["pass_jobs"], self.render["ring_passes"] = pass_jobs, self.pool.ring_passes
         self.render["last_pass"], self.render["last_samples"] = last_pass, last_samples
         self._write("render", self.render)
-        control = np.zeros(_DONE + self.pool.ring_passes, np.uint32)
-        control[_NON_FINITE] = self.non_finite()  # counts over all rounds
-        self._write("control", control)
-        counts = np.zeros((self.groups, layout.COUNTER_STRIDE), np.uint32)
-        counts[:, len(layout.QUEUES)] = self.plan.tuning.group_slots  # all slots idle
-        self._write("counts", counts)
+        counters = np.zeros(_DONE + self.pool.ring_passes, np.uint32)
+        counters[_NON_FINITE] = self.non_finite()  # counts over all rounds
+        self._write("counters", counters)
+        lengths = np.zeros((self.groups, layout.QUEUE_LENGTHS_STRIDE), np.uint32)
+        lengths[:, len(layout.QUEUES)] = self.plan.tuning.group_slots  # all slots idle
+        self._write("queue_lengths", lengths)
 
     def _launch(self, waves: int) -> tuple[int, float]:
         """Run up to `waves` waves; return how many and the seconds they took, which are booked by stage.
@@ -306,10 +306,10 @@ class Wavefront:
                 total += seconds
         return len(launched), total
 
-    def _read_control(self) -> np.ndarray:
-        control = np.empty(_DONE + self.pool.ring_passes, np.uint32)
-        cl.enqueue_copy(self.device.queue, control, self.buffers["control"], is_blocking=True)
-        return control
+    def _read_counters(self) -> np.ndarray:
+        counters = np.empty(_DONE + self.pool.ring_passes, np.uint32)
+        cl.enqueue_copy(self.device.queue, counters, self.buffers["counters"], is_blocking=True)
+        return counters
 
     def _accumulate(self, ring_pass: int, samples: int, first: int) -> None:
         """Add one finished pass, from sample `first` on, to the film and free its place in the ring."""
@@ -323,7 +323,7 @@ class Wavefront:
             *((film["film_counts"],) if "film_counts" in film else ()),
             *((self.buffers["result_firsts"], film["film_firsts"]) if "film_firsts" in film else ()),
             *((self.buffers["pixel_list"],) if self.plan.pixel_list else ()),
-            self.buffers["control"],
+            self.buffers["counters"],
             np.uint32(ring_pass),
             np.uint32(self.pass_samples * self.sample_jobs),
             np.uint32(samples),
@@ -334,7 +334,7 @@ class Wavefront:
         event.wait()
         self.launches += 1
         self.seconds["accumulate"] += 1e-9 * (event.profile.end - event.profile.start)
-        self._write("control", np.zeros(1, np.uint32), 4 * (_DONE + ring_pass))
+        self._write("counters", np.zeros(1, np.uint32), 4 * (_DONE + ring_pass))
 
     def slot_statistics(self) -> dict[str, float]:
         """Statistics that slots keep for themselves, combined over the slots."""
@@ -358,4 +358,4 @@ class Wavefront:
 
     def non_finite(self) -> int:
         """Samples that were NaN or infinite."""
-        return int(self._read_control()[_NON_FINITE])
+        return int(self._read_counters()[_NON_FINITE])

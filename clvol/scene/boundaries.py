@@ -1,6 +1,6 @@
 """Which shapes are surfaces that rays meet, and what bounds each medium.
 
-A cube or sphere without a surface that only holds a medium is no surface: its medium is an *interval* of
+A cube or sphere without a surface that only holds a medium is no surface: its medium is a *span* of
 a ray, worked out afresh for every ray.  Every other shape with media is a *boundary*: a path carries one bit
 for each, set while it is inside, and a medium is present as often as boundaries that hold it, less those that
 name it as their exterior, say (METHODS §6).
@@ -18,14 +18,14 @@ from clvol.scene.materials import Null
 from clvol.scene.primitives import mesh_of
 
 CONVEX = ("cube", "sphere")
-"""Kinds of shape that a ray meets in one interval, found in closed form."""
+"""Kinds of shape that a ray meets in one span, found in closed form."""
 
 
 @dataclass(frozen=True, eq=False)
 class MediumEntry:
     """One medium as the device knows it.
 
-    shape : the shape whose interval bounds it, or None where boundaries do.
+    shape : the shape whose span bounds it, or None where boundaries do.
     everywhere : it fills all that no boundary takes away: a medium that is only ever an exterior, or that the
         sensor names, or both sides of a surface, and no shape holds.
     """
@@ -72,7 +72,7 @@ class Boundaries:
 
 
 def find_boundaries(scene: records.Scene) -> Boundaries:
-    """Sort a scene's shapes into surfaces, intervals and boundaries; a pure function of the records."""
+    """Sort a scene's shapes into surfaces, spans and boundaries; a pure function of the records."""
     shapes = scene.shapes
     divides = [shape.interior is not shape.exterior for shape in shapes]
     pairs = [(s.interior, s.exterior) for s, does in zip(shapes, divides, strict=True) if does]
@@ -114,7 +114,7 @@ def find_boundaries(scene: records.Scene) -> Boundaries:
 
 
 def _is_interval(shape: records.Shape, exteriors: set[int], holders: Counter[int]) -> bool:
-    """Whether the shape only holds a medium, in an interval of any ray.
+    """Whether the shape only holds a medium, in a span of any ray.
 
     What several shapes hold and others keep out has to be counted.
     """

@@ -100,7 +100,7 @@ def glows_in_the_dark(medium: records.Medium) -> bool:
 
 
 def bounding_kind(shape: records.Shape) -> str:
-    """What bounds the medium in a shape's interval: "cube", "sphere" or "none".
+    """What bounds the medium in a shape's span of a ray: "cube", "sphere" or "none".
 
     It is none where the volume's box, which clips the medium anyway, lies within the shape.
     """

@@ -22,7 +22,7 @@ LOST = 2.0**-16
 
 
 def bounding_boxes(entry: MediumEntry) -> list[np.ndarray]:
-    """What bounds a medium's interval of a ray: maps of the cube (-1..1)³ to world space, float64 (4, 4)."""
+    """What bounds a medium's span of a ray: maps of the cube (-1..1)³ to world space, float64 (4, 4)."""
     boxes, sigma_t = [], entry.medium.sigma_t
     if entry.shape is not None:
         boxes.append(entry.shape.to_world)

@@ -21,7 +21,7 @@ CHUNK_BRICKS = 4096
 
 
 def half_extrema(samples: np.ndarray, axis: int, combine: np.ufunc) -> np.ndarray:
-    """Extrema over stretches of BOUND_CELLS cells, both end samples included, along one axis."""
+    """Extrema over runs of BOUND_CELLS cells, both end samples included, along one axis."""
     count = (samples.shape[axis] - 1) // BOUND_CELLS
     shape = samples.shape
     inner = [slice(None)] * samples.ndim

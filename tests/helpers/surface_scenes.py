@@ -47,7 +47,7 @@ def icosphere(centre=(0, 0, 0), radius=1.0, medium=None, level=1, **keywords):
 
 
 def mesh_box(lower, upper, medium=None, **keywords):
-    """A box as a mesh, which is a boundary where a cube would be an interval."""
+    """A box as a mesh, which is a boundary where a cube would be a span."""
     return meshed(trimesh.creation.box(bounds=[lower, upper]), medium, **keywords)
 
 
@@ -83,7 +83,7 @@ def _surfaces(bsdfs):
 
 
 def _media(grids):
-    """A boundary and intervals of either kind that overlap."""
+    """A boundary and spans of either kind that overlap."""
     a, b = CORNER - 0.02, CORNER - 0.02 + SPECK
     return [
         mesh_box(a, b, homogeneous(1.0, 0.5)),

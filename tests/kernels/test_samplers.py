@@ -69,7 +69,7 @@ def test_philox_has_the_published_values_and_those_of_a_second_implementation(pr
 
 
 def test_decisions_of_a_path_never_share_a_block(probe):
-    """Pixel, sample, bounce, block and interval all tell blocks apart, and so does the seed."""
+    """Pixel, sample, bounce, block and segment all tell blocks apart, and so does the seed."""
     grid = np.stack(np.meshgrid([0, 1, 2], [0, 1], [1, 2, 3], range(6), [0, 1]), -1).reshape(-1, 5)
     found = []
     body = """

@@ -61,9 +61,9 @@ def test_the_device_has_the_same_sequence(probe):
 # -- numbers on the device ---------------------------------------------------------------------------
 
 
-def blocks(probe, pixel=0, sample=0, bounce=0, block=CAMERA, interval=0):
+def blocks(probe, pixel=0, sample=0, bounce=0, block=CAMERA, segment=0):
     """decision_block of anything that broadcasts, as the device finds it: uint32 (…, 4)."""
-    keys = np.broadcast_arrays(pixel, sample, bounce, block, interval)
+    keys = np.broadcast_arrays(pixel, sample, bounce, block, segment)
     flat = np.stack([k.ravel() for k in keys], axis=1).astype(np.uint32)
     out = np.zeros((len(flat), 4), np.uint32)
     body = """
@@ -87,8 +87,8 @@ PLACES = [
     {"block": LIGHT, "bounce": 1},
     {"block": SHADOW, "bounce": 1},
     {"block": DIRECTION, "bounce": 1},
-    {"block": WALK, "bounce": 1, "interval": 3},
-    {"block": SURFACE, "bounce": 1, "interval": 2},
+    {"block": WALK, "bounce": 1, "segment": 3},
+    {"block": SURFACE, "bounce": 1, "segment": 2},
     {"block": DIRECTION, "bounce": 70},
 ]
 """Blocks of one path."""
@@ -136,7 +136,7 @@ def test_randomisations_are_scrambled_apart_and_not_only_in_another_order(probe)
 
 
 def test_blocks_never_share_their_numbers(probe):
-    """Pixel, sample, bounce, block, interval and seed all tell them apart."""
+    """Pixel, sample, bounce, block, segment and seed all tell them apart."""
     grid = np.meshgrid([0, 1, 2], [0, 1, 4], [1, 2, 3, 9], range(6), [0, 1, 2**16])
     found = []
     for seed in (3, 3 + 2**32, 9):

@@ -269,7 +269,7 @@ def test_a_launch_moves_paths_and_writes_values_as_its_contract_says(device, mon
         return words
 
     def found():
-        counters = read("counts", (waves.groups, layout.COUNTER_STRIDE)).sum(axis=0)
+        counters = read("queue_lengths", (waves.groups, layout.QUEUE_LENGTHS_STRIDE)).sum(axis=0)
         queued = dict(zip((*QUEUES, IDLE), counters, strict=False))
         return queued, read("state", (len(value_of), waves.stride))
 

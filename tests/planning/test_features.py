@@ -284,7 +284,7 @@ def test_emission_code_comes_with_emission(device):
 def test_fields_for_several_media_come_with_several_media(device):
     one, apart = [fog()], [fog(), box((2, 0, 0), (3, 1, 1), homogeneous(1.0, 0.5))]
     fields = [field_names(plan_of(device, scene(shapes, [SUN]))) for shapes in (one, apart)]
-    assert fields[1] ^ fields[0] == {"medium", "interval_end"}
+    assert fields[1] ^ fields[0] == {"medium", "medium_end"}
 
 
 def test_the_filter_table_comes_with_a_filter_and_the_depth_count_with_a_limit(device):
@@ -323,7 +323,7 @@ MEDIUM_CODE = (
     "majorant/",
     "phase/",
     "stages/medium",
-    "stages/stretch",
+    "stages/segment",
     "stages/collision_scatter",
 )
 PLAIN = replace(ball((0.5, 0.5, 0.5), 0.4), bsdf=Diffuse())
@@ -351,7 +351,7 @@ def test_scenes_without_media_hold_no_tracking_code(device, lights):
     assert not argument_names(plan) & {"media", "phases", "volumes", "bricks", "majorants"}
     assert not field_names(plan) & {
         "medium",
-        "interval_end",
+        "medium_end",
         "lookups",
         "tentative",
         "real",

@@ -46,7 +46,7 @@ def rays_along(lower, upper, tilt=0.0):
 def lengths(device, scene, origins, directions):
     probe = Probe(device, scene, transmittance="regular")
     rays = np.stack([origins - probe.prepared.centre, directions], axis=1).astype(np.float32)
-    headers = [*headers_of(probe.plan, "transmittance"), "geometry/interval.h"]
+    headers = [*headers_of(probe.plan, "transmittance"), "geometry/span.h"]
     return probe.run(headers, SPANS, (np.zeros(len(rays), np.float32),), (rays,))[0]
 
 

@@ -182,7 +182,7 @@ def test_weights_that_are_not_multiplied_are_noticed(monkeypatch):
 
     def source(name):
         text = original(name)
-        if name == "stages/stretch_sample.h":
+        if name == "stages/segment_sample.h":
             assert repeated in text
             return text.replace(repeated, "pass == 1")
         return text

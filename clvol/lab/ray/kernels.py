@@ -30,15 +30,15 @@ class RayKernels(SceneKernels):
     purpose = "the walks", "watch fewer of them"
 
     def places(self, origin: np.ndarray, direction: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
-        """Surfaces on a ray, float32 (n, 3): t, number, entering; and each medium's interval, float64
+        """Surfaces on a ray, float32 (n, 3): t, number, entering; and each medium's span, float64
         (media, 2): single precision would round the length of a thin one away."""
         media = len(self.prepared.boundaries.entries)
-        hits, intervals = np.full((most, 3), np.inf, np.float32), np.empty((media, 3), np.float32)
+        hits, spans = np.full((most, 3), np.inf, np.float32), np.empty((media, 3), np.float32)
         if media:
             given = np.concatenate([origin, direction]).astype(np.float32)
             sizes = np.uint32(media), np.uint32(most)
-            self._run(1, "places", {}, [given], [hits, intervals], sizes)
-        return hits[np.isfinite(hits[:, 0])], intervals[:, :1].astype(float) + intervals[:, 1:]
+            self._run(1, "places", {}, [given], [hits, spans], sizes)
+        return hits[np.isfinite(hits[:, 0])], spans[:, :1].astype(float) + spans[:, 1:]
 
     def tables(
         self, given: np.ndarray, family: str | None, points: int

@@ -79,9 +79,9 @@ def find_places(kernels: RayKernels, x: int, y: int) -> list[Place]:
     direction = direction / np.linalg.norm(direction)
     far = rays.far / float(direction @ rays.forward)
     to_origin = float(np.linalg.norm(origin - rays.eye))
-    hits, intervals = kernels.places(origin, direction, MOST_SURFACES)
+    hits, spans = kernels.places(origin, direction, MOST_SURFACES)
     places = []
-    for part in _parts(prepared, hits, intervals, far):
+    for part in _parts(prepared, hits, spans, far):
         end, notes = part.end, part.notes
         if np.isinf(end):
             end = part.start + SHOWN_RADII * prepared.radius
@@ -105,10 +105,10 @@ def _camera_rays(prepared: PreparedScene) -> CameraRays:
     return camera_rays(scene.sensor, scene.film, prepared.centre, np.inf if everywhere else prepared.radius)
 
 
-def _parts(prepared: PreparedScene, hits: np.ndarray, intervals: np.ndarray, far: float) -> Iterator[_Part]:
+def _parts(prepared: PreparedScene, hits: np.ndarray, spans: np.ndarray, far: float) -> Iterator[_Part]:
     """The parts of the ray in media, in the order of entry.
 
-    hits : float (n, 3), t, surface and whether it is entered.  intervals : float (media, 2).
+    hits : float (n, 3), t, surface and whether it is entered.  spans : float (media, 2).
     """
     bits, notes, start = _bits_at_start(prepared, hits), [], 0.0
     for number in range(len(hits) + 1):
@@ -116,7 +116,7 @@ def _parts(prepared: PreparedScene, hits: np.ndarray, intervals: np.ndarray, far
         presence = _presence(prepared, bits)
         found = sorted(
             (max(start, t0), m, min(end, t1, far))
-            for m, (t0, t1) in enumerate(intervals.tolist())
+            for m, (t0, t1) in enumerate(spans.tolist())
             if presence[m] > 0 and max(start, t0) < min(end, t1, far)
         )
         for first, medium, last in found:

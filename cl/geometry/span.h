@@ -1,6 +1,6 @@
-/* Media as intervals along a ray: analytic cube and sphere, and the box of a volume. */
-#ifndef CLVOL_GEOMETRY_INTERVAL_H
-#define CLVOL_GEOMETRY_INTERVAL_H
+/* Where on a ray a medium is: analytic cube and sphere, and the box of a volume. */
+#ifndef CLVOL_GEOMETRY_SPAN_H
+#define CLVOL_GEOMETRY_SPAN_H
 #if CLVOL_HAS_MEDIA
 #include "core/scene.h"
 
@@ -47,8 +47,8 @@ INLINE void clip_sphere(Ray ray, float *t0, float *t1)
     *t1 = min_of(*t1, middle + half_chord);
 }
 
-/* The part of the ray inside `medium`, cut to [t0, t1]; empty when the result has t0 >= t1. */
-INLINE void medium_interval(__global const Medium *medium, Ray ray, float *t0, float *t1)
+/* Cuts [t0, t1] to the medium; empty when the result has t0 >= t1. */
+INLINE void clip_medium(__global const Medium *medium, Ray ray, float *t0, float *t1)
 {
     if (CLVOL_HAS_CUBE && medium->shape_kind == SHAPE_CUBE)
         clip_box(transform_ray(medium->shape_from_world, ray), (float3)(-1.0f), (float3)(1.0f), t0, t1);
@@ -76,8 +76,8 @@ INLINE float nearest_approach(__global const Medium *medium, Ray ray)
 }
 #endif
 
-/* The part of a ray inside a medium.  Of one that is thin beside the scene, entry and exit are measured from a point of the
-   ray close by: from afar they differ by less than rounding. */
+/* The segment of a ray inside a medium, as two numbers.  Of one that is thin beside the scene, entry and exit are
+   measured from a point of the ray close by: from afar they differ by less than rounding. */
 typedef struct {
     float base; /* ray parameter of that point, 0 for all but thin media */
     float start, end; /* from there */
@@ -96,7 +96,7 @@ INLINE float3 span_origin(const Span *span, Ray ray)
 INLINE float span_t(const Span *span) { return CLVOL_HAS_THIN ? span->base + span->start : span->start; }
 INLINE float3 span_point(const Span *span, Ray ray) { return span_origin(span, ray) + span->start * ray.d; }
 
-/* The part of the ray between `from` and `to` inside `medium`; false where there is none. */
+/* The segment of the ray between `from` and `to` inside `medium`; false where there is none. */
 INLINE bool medium_span(__global const Medium *medium, Ray ray, float from, float to, Span *span)
 {
     span->base = 0.0f;
@@ -107,7 +107,7 @@ INLINE bool medium_span(__global const Medium *medium, Ray ray, float from, floa
 #endif
     span->start = CLVOL_HAS_THIN ? from - span->base : from;
     span->end = CLVOL_HAS_THIN ? to - span->base : to;
-    medium_interval(medium, ray, &span->start, &span->end);
+    clip_medium(medium, ray, &span->start, &span->end);
     return span->start < span->end;
 }
 
