@@ -302,7 +302,10 @@ def test_what_only_the_first_open_pays_for_is_not_the_first_combination_s(monkey
 
     def opened(_device, _scene, choices) -> MadeUp:
         trial = MadeUp()
-        trial.precompute_seconds, trial.names = next(seconds), dict.fromkeys(FAMILIES, choices.technique)
+        trial.precompute_seconds, trial.names = (
+            next(seconds),
+            dict.fromkeys(FAMILIES, choices.names["technique"]),
+        )
         return trial
 
     monkeypatch.setattr("clvol.lab.comparison.combine.Trial.open", opened)
