@@ -177,6 +177,7 @@ def test_free_paths_and_transmittances_are_exact_in_the_mean(view, chromatic):
     assert_exact_in_the_mean(view, chromatic)
 
 
+@pytest.mark.contract
 def test_walks_of_many_legs_are_exact_in_the_mean(bounds):
     bounds(WALK_STEPS=3)
     cut = lumpy()

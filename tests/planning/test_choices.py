@@ -178,6 +178,7 @@ def test_energy_lost_to_caps_merges_as_a_mean():
     assert merged.stats["energy_lost_to_caps"] == pytest.approx(whole.stats["energy_lost_to_caps"], rel=1e-5)
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("technique", ["decomposition", "regular"])
 def test_techniques_without_weights_walk_overlapping_media(technique):
     results = [render(OVERLAPPING, spp=2048, seed=n, technique=t) for n, t in enumerate(("delta", technique))]

@@ -60,6 +60,7 @@ def reference():
     return cloud_picture(SKY_AND_SUN, seed=1)
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("majorant", ["global", "kdtree"])
 def test_global_majorants_and_kd_trees_show_the_picture_of_a_grid(majorant):
     other = cloud_picture(SKY_AND_SUN, majorant, seed=2)

@@ -178,6 +178,7 @@ def test_masks_that_hold_nothing_are_noticed(monkeypatch):
             assert_oracle(ARRANGEMENTS[name], **view)
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize(
     ("old", "new", "view"),
     [

@@ -196,6 +196,7 @@ def test_counts_are_the_same_whether_a_picture_shows_them_or_not():
         assert shown.stats[name] == hidden.stats[name]
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("technique", unbiased("technique"))
 def test_weighted_techniques_stay_right_below_the_bound_and_analog_ones_refuse(technique):
     from pictures import assert_matches

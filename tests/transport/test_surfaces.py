@@ -72,6 +72,7 @@ def test_a_furnace_found_by_its_paths_is_one_in_every_sample(name):
     assert result.stats["non_finite"] == 0
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("name", ["white sphere", "milk round a white sphere, in a mesh", "mask"])
 def test_a_furnace_with_light_sampling_is_one(name):
     assert_matches(show(sampled(FURNACES[name]), spp=1 << 14, seed=2), 1.0)
@@ -161,6 +162,7 @@ def floor_scene(shapes, lights=(DARK,), **more):
     return sampled([FLOOR, *shapes], lights, **EYE | more)
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("name", FILTERS)
 def test_a_square_lamp_lights_a_floor_through_what_lets_light_pass(name):
     """The eye is below what is in the way of the light, so that only shadow rays pass it."""
@@ -286,6 +288,7 @@ def test_depth_counts_scatterings_and_neither_boundaries_nor_holes(depth):
     assert np.abs(light_sampled.image - expected).max() < 1e-4
 
 
+@pytest.mark.contract
 def test_roulette_in_glass_leaves_the_picture_as_it_is():
     """It may start at once, and counts eta²: light in glass is not worth less than outside."""
     absorbing = homogeneous(1.0, 0.8)
