@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from clvol.lab.verdict import SelfTest
     from clvol.picture.merging import merge
     from clvol.picture.result import Result
+    from clvol.planning.plan import Plan
     from clvol.scene import load_dict, load_file, look_at, rotate, scale, translate
     from clvol.scene.records import Scene
 
@@ -36,6 +37,7 @@ __all__ = [
     "DeviceError",
     "Error",
     "OptionError",
+    "Plan",
     "RayView",
     "RenderError",
     "Result",
@@ -68,6 +70,7 @@ _MODULES = {
     "clvol.lab.verdict": ["SelfTest"],
     "clvol.picture.merging": ["merge"],
     "clvol.picture.result": ["Result"],
+    "clvol.planning.plan": ["Plan"],
     "clvol.scene": ["load_dict", "load_file", "look_at", "rotate", "scale", "translate"],
     "clvol.scene.records": ["Scene"],
 }

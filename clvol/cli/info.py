@@ -1,36 +1,71 @@
-"""`clvol info`: what a volume or a scene contains."""
+"""`clvol info`: what a volume or a scene contains, and what a render of the scene would do."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from clvol.cli.messages import tell
-from clvol.cli.options import definitions_option
+from clvol.cli.options import (
+    ExplainedCommand,
+    definitions_option,
+    family_options,
+    majorant_scale_option,
+    step_option,
+)
 from clvol.errors import printable
 
+EXAMPLES = """
+\b
+Examples:
+  clvol info scenes/fire.vdb
+  clvol info scenes/smoke.xml
+  clvol info scenes/smoke.xml --technique spectral
+"""
 
-@click.command()
+
+@click.command(cls=ExplainedCommand, epilog=EXAMPLES)
 @click.argument("file", metavar="FILE")
 @click.option("--grid", metavar="NAME", help="Only this grid of a .vdb, or this array of a .npz.")
+@family_options()
+@majorant_scale_option
+@step_option
 @definitions_option
-def info(file: str, grid: str | None, definitions: tuple[tuple[str, str], ...]) -> None:
+def info(file: str, grid: str | None, definitions: tuple[tuple[str, str], ...], **choices: Any) -> None:
     """Say what a volume or a scene contains.
 
     FILE is a volume (.vdb, .vol, .npy, .npz): its grids, sizes, boxes, values and memory; or a scene
-    (.xml): its camera, film, media and lights.
+    (.xml): its camera, film, media and lights, and the plan of its render: the choices that are in force
+    and why, its features, its stages and what is compiled.  The choices below are those of `clvol render`.
     """
-    from clvol.scene import describe
-
     if Path(file).suffix.lower() == ".xml":
-        import clvol
-
         if grid is not None:
             raise click.UsageError("--grid chooses from a volume file, and this is a scene")
-        lines = describe.describe_scene(clvol.load_file(file, **dict(definitions)))
-    else:
-        if definitions:
-            raise click.UsageError("-D fills a scene's $NAMES, and this is a volume file")
-        lines = describe.describe_volume(file, grid)
-    tell(map(printable, lines))  # a line of names with line breaks in them is one line
+        _tell_scene(file, dict(definitions), choices)
+        return
+    from clvol.scene.describe import describe_volume
+
+    if definitions:
+        raise click.UsageError("-D fills a scene's $NAMES, and this is a volume file")
+    for name, value in choices.items():
+        if value not in ("auto", 1.0, None):
+            option = name.replace("_", "-")
+            raise click.UsageError(f"--{option} is for the render of a scene, and this is a volume file")
+    tell(map(printable, describe_volume(file, grid)))  # a name with line breaks in it is one line
+
+
+def _tell_scene(file: str, definitions: dict[str, str], choices: dict[str, Any]) -> None:
+    """Print what a scene contains, and the plan of its render with these choices."""
+    import clvol
+    from clvol.planning.in_force import warnings
+    from clvol.planning.registry import FAMILIES
+    from clvol.scene.describe import describe_scene
+
+    scene = clvol.load_file(file, **definitions)
+    tell(map(printable, describe_scene(scene)))
+    plan = clvol.plan(scene, **choices)
+    asked = {family: choices[family] for family in FAMILIES}
+    notes = (f"note: {warning}" for warning in warnings(plan, asked))
+    tell(map(printable, ["", *plan.describe(), *notes]))

@@ -63,8 +63,8 @@ def _technique(features: Features, asked: Mapping[str, str]) -> tuple[str, str]:
     """
     sampler = DEFAULT_SAMPLER if asked["sampler"] == "auto" else asked["sampler"]
     hurdles = {
-        "not every medium is dark and glows": not features.dark_emission,
-        "media overlap": features.media_overlap,
+        "not every medium glows in the dark": not features.dark_emission,
+        "media may overlap": features.media_overlap,
         "channels are attenuated differently": features.chromatic_extinction,
         "samples are independent": sampler != "sobol",
         "look-ups are stochastic": asked["lookup"] == "stochastic",
@@ -75,7 +75,7 @@ def _technique(features: Features, asked: Mapping[str, str]) -> tuple[str, str]:
             "regular",
             "collisions are the light, and one low-discrepancy number places a whole flight",
         )
-    return "delta", f"exact flights do not pay where {against[0]}"
+    return "delta", f"exact flights would not pay: {against[0]}"
 
 
 def _transmittance(features: Features) -> tuple[str, str]:

@@ -27,13 +27,22 @@ def describe_plan(plan: Decisions) -> Iterator[str]:
     yield f"channels: {_channels(plan)}"
     if plan.walks_majorants:
         yield f"majorant cells: {_cells(plan)}"
-    yield f"units built: {', '.join((*layout.launched(macros), 'accumulate'))}"
+    yield "stages, in the order of launches: from which queue, to which"
+    for name in layout.launched(macros):
+        stage = layout.stage(name)
+        towards = dict.fromkeys(transition.to for transition in stage.transitions)
+        yield f"  {name:<21} {stage.empties:<10} {', '.join(towards)}"
     fields = layout.path_fields(macros)
-    names = ", ".join(field.name for field in fields)
-    yield from _paragraph("path state", f"{4 * len(fields)} bytes per slot ({names})")
-    yield f"headers chosen: {', '.join(chosen_headers(plan))}"
+    yield from _paragraph("path state", f"{4 * len(fields)} bytes per slot: {_values(macros)}")
+    yield from _paragraph("headers chosen, in cl/", ", ".join(chosen_headers(plan)))
     defined = (f"{name.removeprefix('CLVOL_')}={value}" for name, value in macros.items() if value)
-    yield from _paragraph("macros other than 0, CLVOL_...", ", ".join(defined))
+    yield from _paragraph("macros other than 0, CLVOL_", ", ".join(defined))
+
+
+def _values(macros: layout.Macros) -> str:
+    """The path's values, and of how many fields each is where there are several."""
+    counts = {declared.name: len(declared.fields(macros)) for declared in layout.PATH_STATE}
+    return ", ".join(f"{name} ({n})" if n > 1 else name for name, n in counts.items() if n)
 
 
 def chosen_headers(plan: Decisions) -> list[str]:

@@ -89,6 +89,10 @@ class Features:
 
     def found(self) -> str:
         """One line that names what is there, for the log."""
-        return ", ".join(
-            name if value is True else f"{name} {value}" for name, value in asdict(self).items() if value
-        )
+        return ", ".join(_said(name, value) for name, value in asdict(self).items() if value)
+
+
+def _said(name: str, value: object) -> str:
+    words = " ".join(value).lower() if isinstance(value, tuple) else str(value)
+    name = name.replace("_", " ")
+    return name if value is True else f"{name}: {words}"

@@ -191,6 +191,7 @@ def test_verbose_prints_the_plan_and_quiet_prints_nothing(scene: str, tmp_path: 
     verbose = run("render", scene, "-o", tmp_path / "a.exr", "-v")
     assert verbose.exit_code == 0
     assert "features" in verbose.stderr.lower() and "seconds" in verbose.stderr.lower()
+    assert "generate              GENERATE   INTERSECT, IDLE" in verbose.stderr
     quiet = run("render", scene, "-o", tmp_path / "a.exr", "--quiet")
     assert (quiet.exit_code, quiet.output) == (0, "")
     assert not logging.getLogger("clvol").handlers
@@ -293,6 +294,21 @@ def test_info_describes_a_scene(scene: str) -> None:
         "(0, 0, -4)",
     ):
         assert text in outcome.stdout
+
+
+def test_info_says_what_a_render_would_do_and_compile(scene: str) -> None:
+    outcome = run("info", scene, "-D", "res=12", "--technique", "delta")
+    assert outcome.exit_code == 0, outcome.output
+    for text in (
+        "technique      analytic               closed forms: all media are homogeneous",
+        "medium_sample         MEDIUM     SHADE",
+        "note: technique delta is not used: the scene's media need only the analytic rule",
+    ):
+        assert text in outcome.stdout
+
+
+def test_info_takes_no_choices_for_a_volume() -> None:
+    assert_one_line_error(run("info", SCENES / "cloud.vol", "--technique", "delta"), "--technique")
 
 
 def test_info_describes_a_dense_volume() -> None:
