@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from numbers import Real
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,10 +35,12 @@ from clvol.lab.reduced import reduced
 from clvol.lab.seeds import independent_seeds
 from clvol.lab.trials import Trial, rounds
 from clvol.lab.verdict import SelfTest
-from clvol.picture.result import Result
 from clvol.planning.choices import Choices
 from clvol.rendering.session import MAX_SAMPLES
 from clvol.scene.records import Scene
+
+if TYPE_CHECKING:
+    from clvol.picture.result import Result
 
 LEAST_ROUNDS, MOST_ROUNDS = 4, 32
 ENOUGH_ROUNDS = 2

@@ -8,8 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 Macros = Mapping[str, int]
 """``CLVOL_*`` macros of a plan, by name."""
@@ -205,7 +209,7 @@ PATH_STATE: tuple[Declared, ...] = (
 )
 """In the order in which a slot holds them."""
 
-SLOT_STATISTICS = {
+SLOT_STATISTICS: dict[str, Callable[..., Any]] = {
     "tentative": np.sum,
     "real": np.sum,
     "cells": np.sum,

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
-import numpy as np
 import pyopencl as cl
 
 from clvol.device import programs
-from clvol.device.device import Device
 from clvol.device.launch import run_kernel, scene_arguments
-from clvol.layout.stages import Stage
-from clvol.planning.choices import Choices
 from clvol.planning.plan import Plan
 from clvol.rendering.session import on_device, render_record
 from clvol.rendering.upload import upload_scene
-from clvol.scene.records import Scene
 from clvol.tables.prepare import PreparedScene, prepare
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import numpy as np
+
+    from clvol.device.device import Device
+    from clvol.layout.stages import Stage
+    from clvol.planning.choices import Choices
+    from clvol.scene.records import Scene
 
 
 class SceneKernels:

@@ -6,25 +6,30 @@ Volumes are written brick chunk by brick chunk, so that the host never holds a s
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pyopencl as cl
 
 from clvol import layout
-from clvol.device.device import Device
 from clvol.layout import BRICK_SAMPLES
+from clvol.scene import records
 from clvol.tables.affine import rows_3x4
 from clvol.tables.blackbody import blackbody_table
-from clvol.tables.lights import LightTable, emitter_order, envmap_arrays, light_table
+from clvol.tables.lights import LightTable, envmap_arrays, light_table
 from clvol.tables.materials import material_table
 from clvol.tables.media import medium_table, phase_table
 from clvol.tables.pixel_filter import filter_cdf
-from clvol.tables.prepare import PreparedScene
 from clvol.tables.sobol import block_table
+
+if TYPE_CHECKING:
+    from clvol.device.device import Device
+    from clvol.tables.prepare import PreparedScene
+    from clvol.tables.surfaces import Surfaces
 
 
 def upload_scene(device: Device, prepared: PreparedScene) -> dict[str, cl.Buffer]:
     """Buffers of every scene argument that the plan needs, by argument name."""
-    emitters = emitter_order(prepared.scene)
     buffers: dict[str, cl.Buffer] = {}
     needed = {argument.name for argument in layout.arguments(prepared.plan.macros)}
     if "sobol" in needed:
@@ -41,18 +46,23 @@ def upload_scene(device: Device, prepared: PreparedScene) -> dict[str, cl.Buffer
     if "majorants" in needed:
         buffers["majorants"] = _buffer(device, np.concatenate([m.majorant for m in majorants]))
     if "majorant_links" in needed:
-        buffers["majorant_links"] = _buffer(device, np.concatenate([m.links for m in majorants]))
+        buffers["majorant_links"] = _buffer(
+            device, np.concatenate([m.links for m in majorants if m.links is not None])
+        )
     if "kd_nodes" in needed:
-        buffers["kd_nodes"] = _buffer(device, np.concatenate([m.nodes for m in majorants]))
+        buffers["kd_nodes"] = _buffer(
+            device, np.concatenate([m.nodes for m in majorants if m.nodes is not None])
+        )
     if "controls" in needed:
-        buffers["controls"] = _table(device, [m.control for m in majorants])
+        buffers["controls"] = _table(device, [m.control for m in majorants if m.control is not None])
     if "residuals" in needed:
-        channels = max(m.residual.shape[1] - 1 for m in majorants)
-        rows = [
-            np.hstack([np.broadcast_to(m.residual[:, :-1], (len(m.residual), channels)), m.residual[:, -1:]])
-            for m in majorants
+        residuals = [m.residual for m in majorants if m.residual is not None]
+        channels = max(rows.shape[1] - 1 for rows in residuals)
+        parts = [
+            np.hstack([np.broadcast_to(rows[:, :-1], (len(rows), channels)), rows[:, -1:]])
+            for rows in residuals
         ]
-        buffers["residuals"] = _table(device, rows)
+        buffers["residuals"] = _table(device, parts)
     if "blackbody" in needed:
         buffers["blackbody"] = _buffer(device, blackbody_table())
     if "phases" in needed:
@@ -60,24 +70,24 @@ def upload_scene(device: Device, prepared: PreparedScene) -> dict[str, cl.Buffer
     lights = light_table(prepared.scene, prepared.centre, prepared.radius, prepared.surfaces)
     arrays = {"emitters": lights.emitters, "light_faces": lights.faces, "light_cdf": lights.cdf}
     if prepared.surfaces is not None:
-        arrays |= _surface_arrays(prepared, lights)
+        arrays |= _surface_arrays(prepared.surfaces, lights)
     buffers |= {name: _buffer(device, array) for name, array in arrays.items() if name in needed}
     if "envmap" in needed:
-        for name, array in envmap_arrays(emitters[0]).items():
+        [environment] = (e for e in prepared.scene.emitters if isinstance(e, records.EnvmapEmitter))
+        for name, array in envmap_arrays(environment).items():
             buffers[name] = _buffer(device, array)
     if "filter_cdf" in needed:
         buffers["filter_cdf"] = _buffer(device, filter_cdf(prepared.scene.film.rfilter))
     return buffers
 
 
-def _surface_arrays(prepared: PreparedScene, lights: LightTable) -> dict[str, np.ndarray]:
-    """What the device knows of surfaces, by argument name."""
-    surfaces = prepared.surfaces
+def _surface_arrays(surfaces: Surfaces, lights: LightTable) -> dict[str, np.ndarray]:
+    """What the device knows of surfaces, by argument name; without what no surface has."""
     materials = material_table([shape.bsdf for shape in surfaces.shapes])
     table = surfaces.table.copy()
     table["front"], table["back"] = materials.sides.T
     table["emitter"] = lights.of_shape
-    return {
+    arrays: dict[str, np.ndarray | None] = {
         "bvh_nodes": surfaces.hierarchy.nodes,
         "bvh_triangles": surfaces.hierarchy.packets,
         "quadrics": surfaces.quadrics,
@@ -91,6 +101,7 @@ def _surface_arrays(prepared: PreparedScene, lights: LightTable) -> dict[str, np
         "texels": materials.texels,
         "material_tables": materials.tables,
     }
+    return {name: array for name, array in arrays.items() if array is not None}
 
 
 def _buffer(device: Device, array: np.ndarray) -> cl.Buffer:

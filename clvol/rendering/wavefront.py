@@ -10,18 +10,22 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyopencl as cl
 
 from clvol import layout
-from clvol.device.device import Device
 from clvol.device.launch import launch, scene_arguments, set_arguments
 from clvol.errors import OptionError
-from clvol.planning.plan import Plan
 from clvol.rendering.film import Film
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from clvol.device.device import Device
+    from clvol.planning.plan import Plan
 
 log = logging.getLogger("clvol")
 _NEXT_JOB, _JOB_LIMIT, _NON_FINITE, _DONE = (layout.enum("COUNTER", n) for n in layout.ENUMS["COUNTER"])
@@ -91,7 +95,8 @@ class Wavefront:
         self.list_pixels(None)
         self.groups = pool.slots // plan.tuning.group_slots
         self.fields = layout.path_fields(plan.macros)
-        self.film = self.new_film(tuple(int(word) for word in render["seed"][0]))
+        low, high = (int(word) for word in render["seed"][0])
+        self.film = self.new_film((low, high))
         self._harvested = time.perf_counter()
         self.stride = pool.slots + 16  # off the power of two, or all fields of a slot share a cache set
         self.seconds = dict.fromkeys((*plan.stages, "accumulate"), 0.0)
@@ -184,13 +189,11 @@ class Wavefront:
         per_round = max(1, _MAX_ROUND_JOBS // (self.pass_samples * self.sample_jobs)) * self.pass_samples
         while done < count and not (done and should_stop()):
             part = min(count - done, per_round)
-            finished = self._run_round(
-                first + done,
-                part,
-                should_stop,
-                lambda n, base=done: report(Progressed(base + n, time.perf_counter() - start)),
-                done > 0,
-            )
+
+            def tell(n: int, base: int = done) -> None:
+                report(Progressed(base + n, time.perf_counter() - start))
+
+            finished = self._run_round(first + done, part, should_stop, tell, done > 0)
             done += finished
             if finished < part:
                 break
@@ -256,8 +259,10 @@ class Wavefront:
                 self._write("state", values, values.nbytes * row)
 
     def warm_up(self) -> None:
-        """Run every kernel once with nothing to do: some drivers (PoCL) compile at the first launch, which
-        is part of setting up and not of the render."""
+        """Run every kernel once with nothing to do.
+
+        Some drivers (PoCL) compile at the first launch, which is part of setting up and not of the render.
+        """
         self._start_round(0, self.pass_samples * self.sample_jobs, 0, self.pass_samples)
         self._launch(1)
         self._accumulate(0, 0, 0)

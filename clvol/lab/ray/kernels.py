@@ -6,16 +6,19 @@ What they run is the headers that the plan's own stages include, with hooks that
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyopencl as cl
 
 from clvol.lab.ray.walks import CELL, OUTCOME
-from clvol.planning import registry
 from clvol.rendering.scene_kernels import SceneKernels
 from clvol.rendering.session import seed_words
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from clvol.planning import registry
 
 EVENT_SIZE = 5
 """Floats of an event, as cl/ray/recorder.h writes it."""
@@ -30,8 +33,10 @@ class RayKernels(SceneKernels):
     purpose = "the walks", "watch fewer of them"
 
     def places(self, origin: np.ndarray, direction: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
-        """Surfaces on a ray, float32 (n, 3): t, number, entering; and each medium's span, float64
-        (media, 2): single precision would round the length of a thin one away."""
+        """Surfaces on a ray, float32 (n, 3): t, number, entering; and media's spans, float64 (media, 2).
+
+        Single precision would round the length of a thin one away.
+        """
         media = len(self.prepared.boundaries.entries)
         hits, spans = np.full((most, 3), np.inf, np.float32), np.empty((media, 3), np.float32)
         if media:
@@ -43,8 +48,10 @@ class RayKernels(SceneKernels):
     def tables(
         self, given: np.ndarray, family: str | None, points: int
     ) -> tuple[np.ndarray, np.ndarray | None]:
-        """sigma_t at even steps of a ray, float32 (channels, points), and the cells of the majorant,
-        `CELL` (n,), None where `family` walks none or is None."""
+        """sigma_t at even steps of a ray, float32 (channels, points), and the majorant's cells, `CELL` (n,).
+
+        There are none, None, where `family` walks none or is None.
+        """
         channels = 3 if self.plan.features.chromatic_extinction else 1
         walks = family is not None and self._tracker(family).walks_majorant
         macros = {
@@ -66,7 +73,7 @@ class RayKernels(SceneKernels):
         log = np.zeros((recorded, MOST_EVENTS, EVENT_SIZE), np.float32)
         macros = {"CLVOL_RAY_COLLISIONS": family == "technique"}
         sizes = [np.uint32(n) for n in (walks, recorded, MOST_EVENTS)]
-        seeds = cl.cltypes.make_uint2(*seed_words(seed))
+        seeds = cl.cltypes.make_uint2(*seed_words(seed))  # type: ignore[attr-defined]  # made at import
         self._run(walks, "walks", macros, [given], [outcomes, log], [seeds, *sizes])
         return outcomes, [events[: int(o["events"])] for events, o in zip(log, outcomes, strict=False)]
 

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from clvol.errors import OptionError
-from clvol.lab.ray.kernels import RayKernels
 from clvol.scene.boundaries import entry_bounds
 from clvol.scene.material_facts import is_transmissive, passes_light
 from clvol.scene.materials import Null
 from clvol.tables.apart import peak_extinction
 from clvol.tables.camera import CameraRays, camera_rays
-from clvol.tables.prepare import PreparedScene
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from clvol.lab.ray.kernels import RayKernels
+    from clvol.tables.prepare import PreparedScene
 
 MOST_SURFACES = 64
 """Surfaces that a ray may pass before it meets a medium."""
@@ -110,7 +113,8 @@ def _parts(prepared: PreparedScene, hits: np.ndarray, spans: np.ndarray, far: fl
 
     hits : float (n, 3), t, surface and whether it is entered.  spans : float (media, 2).
     """
-    bits, notes, start = _bits_at_start(prepared, hits), [], 0.0
+    bits, start = _bits_at_start(prepared, hits), 0.0
+    notes: list[str] = []
     for number in range(len(hits) + 1):
         end = float(hits[number, 0]) if number < len(hits) else np.inf
         presence = _presence(prepared, bits)
@@ -123,7 +127,7 @@ def _parts(prepared: PreparedScene, hits: np.ndarray, spans: np.ndarray, far: fl
             others = sum(t0 < last and first < t1 for t0, _, t1 in found) - 1
             overlap = [f"{others} more media overlap this one, and are not shown."] if others else []
             yield _Part(medium, int(presence[medium]), first, last, (*notes, *overlap))
-        if number == len(hits):
+        if number == len(hits) or prepared.surfaces is None:
             return
         surface = int(hits[number, 1])
         bsdf = prepared.surfaces.shapes[surface].bsdf
@@ -140,6 +144,8 @@ def _parts(prepared: PreparedScene, hits: np.ndarray, spans: np.ndarray, far: fl
 def _bits_at_start(prepared: PreparedScene, hits: np.ndarray) -> np.ndarray:
     """Whether the ray starts inside of each boundary: where its first crossing leads out."""
     bits = np.zeros(len(prepared.boundaries.boundaries), bool)
+    if prepared.surfaces is None:
+        return bits
     for _, surface, enters in hits[::-1]:
         boundary = int(prepared.surfaces.table["boundary"][int(surface)])
         if boundary >= 0:

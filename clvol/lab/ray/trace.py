@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +20,9 @@ from clvol.planning import registry
 from clvol.planning.choices import Choices
 from clvol.scene.medium_facts import is_homogeneous
 from clvol.scene.records import Scene
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
 
 log = logging.getLogger("clvol")
 POINTS = 1 << 13

@@ -98,7 +98,7 @@ def read_walk(outcome: np.void | np.ndarray, events: np.ndarray) -> Walk:
             if open_collision:
                 open_collision.sigma_t = numbers
         elif kind == NULL:
-            walk.weights.append((open_collision.t, numbers))
+            walk.weights.append((t if open_collision is None else open_collision.t, numbers))
         elif kind == REAL:
             if open_collision is None:  # found without tentative collisions
                 walk.collisions.append(Collision(t, kind="real"))
@@ -177,12 +177,13 @@ class Watched:
     def control_depth(self, edges: np.ndarray, channel: int) -> np.ndarray:
         """Optical depth of the control from the entry to each of `edges`; 0 where there is none."""
         control = self.control(channel)
-        if control is None:
+        if control is None or self.cells is None:
             return np.zeros_like(edges)
         starts, ends = (self.cells[name].astype(np.float64) for name in ("t", "t_end"))
         depth = np.concatenate([[0.0], np.cumsum(control * (ends - starts))])
         ends = np.concatenate([[0.0], ends])
-        return np.interp(edges, ends, depth)
+        interpolated: np.ndarray = np.interp(edges, ends, depth)
+        return interpolated
 
     def running_estimate(self, walk: Walk, edges: np.ndarray, channel: int) -> np.ndarray:
         """What a walk's estimate of transmittance would be if the medium ended at each of `edges`."""
@@ -194,4 +195,5 @@ class Watched:
         values = np.array([value for _, value in steps])
         number = np.searchsorted(at, edges, side="right") - 1
         since = self.control_depth(edges, channel) - self.control_depth(at, channel)[number]
-        return values[number] * np.exp(-since)
+        estimate: np.ndarray = values[number] * np.exp(-since)
+        return estimate

@@ -10,13 +10,14 @@ from matplotlib.patches import Patch
 
 from clvol.lab.colours import BLACK
 from clvol.lab.ray.looks import CHANNEL_COLOURS, CONTROL, DISTANCE, MAJORANT, SIGNS, colour
-from clvol.lab.ray.walks import Walk, Watched
 from clvol.lab.ray.watched import CHANNEL_NAMES, WatchedRay
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.gridspec import SubplotSpec
+
+    from clvol.lab.ray.walks import Walk, Watched
 
 
 def walks_panel(
@@ -28,9 +29,9 @@ def walks_panel(
     last: bool,
 ) -> Axes:
     """Walks, one a row, over density, majorant and control; returns the axes whose distances others share."""
-    strip, below = place.subgridspec(2, 1, height_ratios=(1.0, 1.35), hspace=0.0)
-    walks = figure.add_subplot(strip, sharex=first)
-    medium = figure.add_subplot(below, sharex=walks)
+    rows = place.subgridspec(2, 1, height_ratios=(1.0, 1.35), hspace=0.0)
+    walks = figure.add_subplot(rows[0], sharex=first)
+    medium = figure.add_subplot(rows[1], sharex=walks)
     look = colour(view, watched)
     kind = "collisions" if watched.family == "technique" else "transmittance"
     residual = "residual " if watched.name == "residual-ratio" else ""
@@ -62,12 +63,12 @@ def _draw_walk(axes: Axes, view: WatchedRay, walk: Walk, row: int, look: str) ->
     axes.plot([start, start + end], [row, row], color=look, lw=1.0, alpha=0.6, zorder=1)
     if reach is None:
         axes.plot([start + min(length, view.window[1])], [row], ">", color=look, ms=5, clip_on=False)
-    found = {"null": [], "real": [], "control": []}
+    found: dict[str, list[float]] = {"null": [], "real": [], "control": []}
     for collision in walk.collisions:
         found[collision.kind].append(start + collision.t)
     if _shows_lookups(walk):
-        t = start + np.array(walk.lookups)
-        axes.plot(t, np.full(len(t), row), "|", color="#666666", ms=4, mew=0.7, zorder=2)
+        at = start + np.array(walk.lookups)
+        axes.plot(at, np.full(len(at), row), "|", color="#666666", ms=4, mew=0.7, zorder=2)
     for kind, t in found.items():
         axes.plot(t, [row] * len(t), zorder=3, **SIGNS[kind])
     if lost:
@@ -93,7 +94,7 @@ def _draw_medium(axes: Axes, view: WatchedRay, watched: Watched) -> None:
         )
     top = sigma.max()
     for values, how in ((watched.rate(), MAJORANT), (watched.control(view.channel), CONTROL)):
-        if values is not None:
+        if values is not None and watched.cells is not None:
             planes = start + np.append(watched.cells["t"], watched.cells["t_end"][-1]).astype(np.float64)
             axes.stairs(values, planes, baseline=None, **how)
             top = max(top, values.max())

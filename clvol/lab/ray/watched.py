@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.lab.ray.place import Place
-from clvol.lab.ray.walks import Watched
+if TYPE_CHECKING:
+    from clvol.lab.ray.place import Place
+    from clvol.lab.ray.walks import Watched
 
 CHANNEL_NAMES = ("red", "green", "blue")
 DARK = 1e-3
@@ -59,8 +61,9 @@ class WatchedRay:
         matter = np.flatnonzero(self.sigma_t.any(axis=0))
         first, last = self.edges[matter[0]], self.edges[matter[-1] + 1]
         for watched in self.watched:
-            if watched.rate() is not None:
-                first = min(first, *watched.cells["t"][watched.rate() > 0].tolist())
+            rate = watched.rate()
+            if watched.cells is not None and rate is not None:
+                first = min(first, *watched.cells["t"][rate > 0].tolist())
         dark = np.flatnonzero(self.transmittance[self.channel] < DARK)
         if len(dark):
             ends = [walk.reach(self.channel) for watched in self.watched for walk in watched.walks]
@@ -77,7 +80,8 @@ class WatchedRay:
     @property
     def transmittance(self) -> np.ndarray:
         """exp(-depth), float64 (channels, n + 1)."""
-        return np.exp(-self.depth)
+        transmittance: np.ndarray = np.exp(-self.depth)
+        return transmittance
 
     @property
     def bound_notes(self) -> list[str]:
@@ -85,12 +89,12 @@ class WatchedRay:
         others = np.delete(self.sigma_t, self.channel, axis=0)
         middles, exceeded = (self.edges[1:] + self.edges[:-1]) / 2, []
         for watched in self.watched:
-            if watched.rate() is None or watched.name == "residual-ratio" or not len(others):
+            cells, rate = watched.cells, watched.rate()
+            if cells is None or rate is None or watched.name == "residual-ratio" or not len(others):
                 continue
-            cells = watched.cells
             place = np.minimum(np.searchsorted(cells["t_end"], middles), len(cells) - 1)
             inside = (middles >= cells["t"][0]) & (middles <= cells["t_end"][-1])
-            if (inside & (others > 1.001 * watched.rate()[place])).any():
+            if (inside & (others > 1.001 * rate[place])).any():
                 exceeded.append(watched.label)
         if not exceeded:
             return []
