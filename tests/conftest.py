@@ -45,8 +45,10 @@ def pytest_collection_modifyitems(config, items):
 
 @pytest.fixture(scope="session", autouse=True)
 def independent_samples():
-    """Tests judge single pixels by their variance, which has many degrees of freedom where samples are
-    independent: that is the default here.  Low-discrepancy samples are asked for by name (test_sobol.py)."""
+    """Tests judge single pixels by their variance, from independent samples.
+
+    These have many degrees of freedom.  Low-discrepancy samples are asked for by name (test_sobol.py).
+    """
     from clvol.planning import auto
 
     with pytest.MonkeyPatch.context() as patch:

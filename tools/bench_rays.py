@@ -19,9 +19,8 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
@@ -35,6 +34,9 @@ from clvol.accel.bvh import Bvh, build_bvh
 from clvol.device import programs
 from clvol.device.device import Device, open_device
 from clvol.device.launch import run_kernel
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 REQUIREMENT = "embreex"
 SIZES = (70_000, 1_000_000)

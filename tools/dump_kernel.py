@@ -6,6 +6,7 @@ python tools/dump_kernel.py scenes/cloud.xml --majorant kdtree -o kernels
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from scene_options import choice_options, open_scene
@@ -14,7 +15,9 @@ from clvol.cli.messages import fail
 from clvol.cli.options import ExplainedCommand, definitions_option
 from clvol.device.programs import stage_source
 from clvol.errors import DeviceError, Error
-from clvol.planning.plan import Plan
+
+if TYPE_CHECKING:
+    from clvol.planning.plan import Plan
 
 
 def dump(plan: Plan, folder: Path) -> list[Path]:

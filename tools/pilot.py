@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import itertools
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import click
 import numpy as np
@@ -29,6 +29,9 @@ from clvol.lab.quiet import quiet_renders
 from clvol.lab.seeds import independent_seeds
 from clvol.planning.choices import Choices
 from clvol.scene import load_file
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 SCENES = {
     "cloud": {"res": 96},
@@ -86,8 +89,9 @@ class Tested:
 
 
 def unmet(pilot: Pilot, count: int) -> list[Candidate]:
-    """So many combinations that the search did not meet, drawn from all that are possible and compose kernels
-    of their own; rendered as often as the search does at first, hopelessly slow ones once.
+    """So many combinations that the search did not meet, of all that are possible and compose own kernels.
+
+    They are rendered as often as the search does at first, hopelessly slow ones once.
     """
     product = list(itertools.product(*(unbiased(family) for family in CHOSEN)))
     drawn = (product[place] for place in np.random.default_rng(0).permutation(len(product)))

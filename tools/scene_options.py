@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from clvol.cli.options import device_option, family_options
 from clvol.device.device import Device, open_device
-from clvol.picture.result import Result
 from clvol.planning.choices import Choices
 from clvol.planning.plan import Plan
 from clvol.rendering.outcome import make_result
 from clvol.rendering.session import Session, on_device
 from clvol.scene import load_file
-from clvol.scene.records import Scene
 from clvol.tables.prepare import PreparedScene, prepare
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from clvol.picture.result import Result
+    from clvol.scene.records import Scene
 
 
 class Timed(NamedTuple):

@@ -108,7 +108,7 @@ def test_a_packed_maximum_is_never_lower(value):
 
 @pytest.mark.parametrize("bad", [np.inf, np.nan, -1.0])
 def test_a_majorant_that_is_no_bound_is_refused(bad):
-    with pytest.raises(ValueError):
+    with pytest.raises(ValueError, match="must be finite and not negative"):
         pack_maximum(np.array([bad], np.float32))
 
 

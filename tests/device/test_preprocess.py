@@ -48,7 +48,7 @@ def test_a_file_of_which_nothing_is_left_leaves_no_trace():
 
 
 @pytest.mark.parametrize(
-    "n, x, left", [(1, 0, "one"), (1, 1, "one"), (2, 0, "many"), (2, 1, "none"), (0, 0, "none")]
+    ("n", "x", "left"), [(1, 0, "one"), (1, 1, "one"), (2, 0, "many"), (2, 1, "none"), (0, 0, "none")]
 )
 def test_one_branch_is_left(n, x, left):
     assert lines('#include "branches.h"', N=n, X=x) == [left]

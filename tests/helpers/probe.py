@@ -78,7 +78,7 @@ class Probe(SceneKernels):
         super().upload(seed)
 
     def run(self, headers, body, outputs, inputs=(), stage=None):
-        """Run `body` for `outputs[0].size` work-items with index `i`; arrays are in0, …, out0, …
+        """Run `body` for `outputs[0].size` work-items with index `i`; arrays are in0, in1, out0, and so on.
 
         `stage` names the stage whose functions it calls, and whose contract holds.
         """

@@ -219,8 +219,10 @@ def shape(kind, to_world, emission=(1.0,), flip=False, mesh=None):
 
 
 def patches(normals=False):
-    """Five triangles of very different sizes, one of them of none, not in a plane; the winding of two faces
-    the other way, where `normals` do not overrule it."""
+    """Five triangles of very different sizes, one of them of none, not in a plane.
+
+    Two faces are wound the other way, where `normals` do not overrule it.
+    """
     vertices = np.array(
         [[-1, -1, 0], [1, -1, 0.2], [1, 1, 0], [-1, 1, 0.3], [2.5, 0, 0.1], [1.01, 1, 0.2], [-1.1, 0, 0.5]]
     )
@@ -330,8 +332,10 @@ def place_in_unit_square(light, world, point, samples):
 
 @pytest.mark.parametrize("place", FROM)
 def test_points_of_lights_are_drawn_by_their_density(lit, place):
-    """In the density that is said, which `area_pdf` repeats for a hit there; and the side that emits is the
-    one that `hit_surface` calls the front."""
+    """In the density that is said, which `area_pdf` repeats for a hit there.
+
+    And the side that emits is the one that `hit_surface` calls the front.
+    """
     light, world = lit
     point = world_point(light, place)
     samples = area_samples(world.sample(point, DRAWS))
@@ -530,7 +534,7 @@ def test_a_scene_of_many_lights_sums_them(device):
     assert (np.abs(z_score(mean, variance, expected)) < largest_z(3)).all(), (mean, expected)
 
 
-@pytest.mark.parametrize("radius, distance", [(1.0, 1.772453850905516e5), (1e-6, 0.5), (1e3, 1e3 + 0.01)])
+@pytest.mark.parametrize(("radius", "distance"), [(1.0, 1.772453850905516e5), (1e-6, 0.5), (1e3, 1e3 + 0.01)])
 def test_tiny_far_and_huge_spheres_have_their_solid_angle(device, radius, distance):
     """The first subtends 1e-10 sr; none of it is lost to rounding, nor in the density of a hit."""
     light = shape("sphere", translate((0, 0, distance)) @ scale(radius))
@@ -572,7 +576,7 @@ def spot_intensity(device, cutoff, beam, angles):
     return np.array(values)
 
 
-@pytest.mark.parametrize("cutoff, beam", SPOTS)
+@pytest.mark.parametrize(("cutoff", "beam"), SPOTS)
 def test_spots_fall_off_as_mitsubas(device, cutoff, beam):
     frozen = np.array(SPOTS[cutoff, beam].split(), float)
     assert np.abs(spot_intensity(device, cutoff, beam, np.radians(SHARES * cutoff)) - frozen).max() < 2e-5
@@ -585,7 +589,7 @@ def test_narrow_spots_keep_their_profile(device):
     assert np.abs(spot_intensity(device, 0.01, 0.002, angles) - expected).max() < 5e-3
 
 
-@pytest.mark.parametrize("cutoff, beam", [*SPOTS, (0.01, 0.002), (20.0, 30.0)])
+@pytest.mark.parametrize(("cutoff", "beam"), [*SPOTS, (0.01, 0.002), (20.0, 30.0)])
 def test_a_spots_power_is_the_integral_of_its_fall_off(cutoff, beam):
     c, b = np.radians(cutoff), np.radians(min(beam, cutoff))
     angle = (np.arange(200_000) + 0.5) / 200_000 * c

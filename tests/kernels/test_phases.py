@@ -112,7 +112,9 @@ def phase_p_value(phase, x, azimuth):
 @pytest.mark.parametrize("g", GS)
 def test_henyey_greenstein_directions_follow_the_phase_function(hg_probe, g):
     """χ² where a float direction resolves the lobe; mean cosine g and second Legendre moment g² always.
-    Distances are from the peak, which is behind where g < 0."""
+
+    Distances are from the peak, which is behind where g < 0.
+    """
     set_lobes(hg_probe, ("hg", g, 1.0))
     g = float(np.float32(g))
     x, azimuth, pdf, evaluated = sampled_phase(hg_probe, backward=g < 0)

@@ -145,7 +145,7 @@ def test_uniform_floats_are_the_middles_of_their_cells(probe):
 RATES = [(1.0, 1.0), (0.3, 0.9), (1e-8, 1.0), (1.0, 1e-8), (3e-5, 20.0), (5.0, 1e-3)]
 
 
-@pytest.mark.parametrize("part, rest", RATES)
+@pytest.mark.parametrize(("part", "rest"), RATES)
 def test_events_are_chosen_at_their_rate_at_full_resolution(probe, part, rest):
     """The number of words k that choose the event, by bisection (the choice is monotonic in k)."""
     body = f"""
@@ -360,7 +360,7 @@ def filter_probe(request, device):
 
 
 @pytest.mark.parametrize("sample_border", [False, True])
-@pytest.mark.parametrize("pixel, pixels", [(4, 9), (0, 9), (8, 9), (1, 3), (0, 1)])
+@pytest.mark.parametrize(("pixel", "pixels"), [(4, 9), (0, 9), (8, 9), (1, 3), (0, 1)])
 def test_pixel_offsets_follow_the_filter_cut_at_the_films_edge(filter_probe, sample_border, pixel, pixels):
     rfilter, probes = filter_probe
     out = np.zeros(DRAWS, np.float32)

@@ -1,5 +1,8 @@
-"""The contract, on the device functions: every technique's collisions follow the exact distribution, every
-transmittance estimate has the exact mean, whatever the majorant and the look-up (METHODS §1)."""
+"""The contract, on the device functions.
+
+Every technique's collisions follow the exact distribution, every transmittance estimate has the exact mean,
+whatever the majorant and the look-up (METHODS §1).
+"""
 
 import itertools
 from dataclasses import replace
@@ -289,7 +292,7 @@ def test_a_power_series_survives_thick_media(device, depth):
 
 
 def test_marching_is_biased_until_its_steps_are_fine(device):
-    """exp of a noisy sum is too large on the mean: the baseline shows it."""
+    """The exp of a noisy sum is too large on the mean: the baseline shows it."""
     ray, length = RAYS["oblique"], exit_distance(*RAYS["oblique"])
     exact = np.exp(-exact_depth("sparse", "oblique")[0, -1])
     for step, is_biased in ((0.5, True), (1e-3, False)):

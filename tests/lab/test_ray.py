@@ -1,5 +1,7 @@
-"""`clvol ray` shows what the renderer does: tables, walks and estimates along a camera ray are those of the
-device functions, and agree with float64."""
+"""`clvol ray` shows what the renderer does.
+
+Tables, walks and estimates along a camera ray are those of the device functions, and agree with float64.
+"""
 
 from __future__ import annotations
 

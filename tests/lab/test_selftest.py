@@ -126,7 +126,9 @@ def test_what_the_wrong_ones_share_is_named():
 
 def test_a_bias_that_many_share_is_not_hidden_in_what_they_are_compared_with():
     """Of the least size that the self-test says it sees: two thirds of the combinations, then half of them.
-    The test of each combination alone, against a pool of mostly guilty ones, sees far less."""
+
+    The test of each combination alone, against a pool of mostly guilty ones, sees far less.
+    """
     clean = made_up(np.random.default_rng(1), GRID)
     limit = max(judge(clean, 1e-4).limits)
     seen, tries = 0, 15
@@ -205,7 +207,7 @@ def test_nothing_of_the_table_is_cut_on_a_narrow_terminal():
 
 
 @pytest.mark.parametrize(
-    "totals, needs_bound, passed",
+    ("totals", "needs_bound", "passed"),
     [
         ({}, True, True),
         ({"non_finite": 1}, False, False),

@@ -1,5 +1,6 @@
-"""The contracts of the stages: that they make sense together, and that the code does what they say, no less
-and no more.
+"""The contracts of the stages.
+
+That they make sense together, and that the code does what they say, no less and no more.
 
 More does not compile.  For less, sources are searched, of scenes that together need all of a path's state.
 """
@@ -226,7 +227,7 @@ def test_paths_are_moved_by_transitions_alone(device):
 
 
 @pytest.mark.parametrize(
-    "stage, old, new",
+    ("stage", "old", "new"),
     [
         ("intersect", "to_medium(", "to_generate("),
         ("medium_sample", "to_shade(", "to_intersect("),

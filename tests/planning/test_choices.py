@@ -29,7 +29,7 @@ OVERLAPPING = scene(more=[box((0.5, 0, 0), (1.5, 1, 1), homogeneous(1.0, 0.5))])
 
 
 @pytest.mark.parametrize(
-    "described, technique, transmittance",
+    ("described", "technique", "transmittance"),
     [
         (scene(), "delta", "ratio"),
         (scene(lights=(SKY,)), "delta", "none"),
@@ -52,7 +52,7 @@ def glowing(albedo=0.5, scale=(3.0,), more=()):
 
 
 @pytest.mark.parametrize(
-    "described, asked, technique",
+    ("described", "asked", "technique"),
     [
         (glowing(), {}, "regular"),
         (glowing(), {"sampler": "independent"}, "delta"),
@@ -73,7 +73,7 @@ def test_auto_takes_exact_flights_where_low_discrepancy_samples_meet_dark_media_
 
 
 @pytest.mark.parametrize(
-    "described, choices, why, instead",
+    ("described", "choices", "why", "instead"),
     [
         (scene(), {"transmittance": "none"}, "point, spot and directional", "ratio"),
         (scene(), {"majorant_scale": 0.9}, "bounds are too low", "weighted-delta"),
@@ -104,7 +104,7 @@ def test_what_cannot_be_right_is_refused_with_a_reason_and_a_way_out(described, 
     assert why in str(caught.value) and instead in str(caught.value)
 
 
-@pytest.mark.parametrize("technique, transmittance", [("marching", "ratio"), ("delta", "marching")])
+@pytest.mark.parametrize(("technique", "transmittance"), [("marching", "ratio"), ("delta", "marching")])
 def test_marching_says_that_it_is_biased_and_a_fine_step_is_near_the_truth(technique, transmittance, caplog):
     thick = scene((30.0,))
     with caplog.at_level(logging.WARNING, "clvol"):
@@ -123,7 +123,7 @@ def test_the_label_of_a_biased_picture_is_in_the_file(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "choices, word",
+    ("choices", "word"),
     [
         ({"probability": "max"}, "probability max is not used"),
         ({"control": "min"}, "control min is not used"),

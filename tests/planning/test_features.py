@@ -100,7 +100,7 @@ def field_names(plan):
 
 
 @pytest.mark.parametrize(
-    "name, stages",
+    ("name", "stages"),
     {
         "nothing": "generate intersect shade",
         "a sky": "generate intersect shade",
@@ -178,7 +178,7 @@ def test_grids_hold_no_analytic_tracking(device):
 
 
 @pytest.mark.parametrize(
-    "majorant, buffer", {"global": "", "grid": "majorants", "kdtree": "kd_nodes"}.items()
+    ("majorant", "buffer"), {"global": "", "grid": "majorants", "kdtree": "kd_nodes"}.items()
 )
 def test_one_majorant_is_compiled_and_only_its_buffer_is_bound(device, majorant, buffer):
     plan = plan_of(device, SCENES["a grid"], majorant)
@@ -372,7 +372,7 @@ def test_what_shade_handles_comes_with_what_paths_can_meet(device):
 
 
 @pytest.mark.parametrize(
-    "bsdf, files",
+    ("bsdf", "files"),
     [
         (Diffuse(), {"diffuse"}),
         (Dielectric(), {"dielectric", "fresnel"}),

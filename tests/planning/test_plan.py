@@ -111,7 +111,7 @@ BESIDE = box((0.5, 0, 0), (1.5, 1, 1), homogeneous(1.0, 0.5))
 
 
 @pytest.mark.parametrize(
-    "described, asked, family, name, reason",
+    ("described", "asked", "family", "name", "reason"),
     [
         (scene(), {}, "technique", "delta", "not every medium glows in the dark"),
         (glowing(), {"sampler": "sobol"}, "technique", "regular", "collisions are the light"),

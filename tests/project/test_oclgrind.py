@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import importlib
-from types import ModuleType
+from typing import TYPE_CHECKING
 
 import pytest
 from places import ROOT, SCENES, TOOLS
 
 from clvol.planning import registry
+
+if TYPE_CHECKING:
+    from types import ModuleType
 
 LOG = """
 Read-write data race at global memory address 0x1d000000000000

@@ -8,9 +8,8 @@ import re
 import runpy
 import subprocess
 import sys
-from pathlib import Path
 from types import ModuleType, SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
@@ -25,6 +24,9 @@ from clvol.planning import registry
 from clvol.planning.choices import Choices
 from clvol.scene.mesh import mesh_flaws
 from clvol.scene.records import GridVolume, Mesh
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 CLOUD = str(SCENES / "cloud.xml")
 

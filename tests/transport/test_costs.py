@@ -163,8 +163,11 @@ def test_counts_of_a_render_add_up():
 
 
 def test_pictures_of_variance_and_efficiency_are_those_of_the_estimate():
-    """Variance is that of a sample; 1 / (efficiency · variance of the pixel) adds up to the stages' seconds,
-    and is a pixel's share of them: even where stages have no media to walk, by work where they have."""
+    """Variance is that of a sample.
+
+    1 / (efficiency · variance of the pixel) adds up to the stages' seconds, and is a pixel's share of them:
+    even where stages have no media to walk, by work where they have.
+    """
     result = render(chromatic_scene((0.9,)), spp=8, aov=("variance", "efficiency", "cells"))
     of_pixels = result.variance.mean(axis=-1)
     np.testing.assert_allclose(result.aovs["variance"], 8 * of_pixels, rtol=1e-5)

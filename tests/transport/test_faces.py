@@ -1,5 +1,8 @@
-"""Rays that run exactly in a face or an edge of a medium's box: the lower face of each pair counts, the upper
-does not, whatever the direction, the technique and the transmittance."""
+"""Rays that run exactly in a face or an edge of a medium's box.
+
+The lower face of each pair counts, the upper does not, whatever the direction, the technique and the
+transmittance.
+"""
 
 import itertools
 
@@ -28,8 +31,10 @@ SPANS = """
 
 
 def rays_along(lower, upper, tilt=0.0):
-    """Rays along every axis, both ways, at each pair of places across: origins, directions, and whether each
-    runs through the box by the rule."""
+    """Rays along every axis, both ways, at each pair of places across.
+
+    Returns origins, directions, and whether each runs through the box by the rule.
+    """
     rays, through = [], []
     for axis, way, places in itertools.product(range(3), (1, -1), itertools.product(PLACES, repeat=2)):
         across = [a for a in range(3) if a != axis]

@@ -1,5 +1,8 @@
-"""Large volumes that are mostly empty: the tree of bricks and the majorants over it say what dense arrays
-say, and take memory and time for what is in them, not for their box."""
+"""Large volumes that are mostly empty.
+
+The tree of bricks and the majorants over it say what dense arrays say, and take memory and time for what is
+in them, not for their box.
+"""
 
 import tracemalloc
 from dataclasses import replace
