@@ -48,7 +48,7 @@ KERNEL = """
 __kernel void trace(__global const float8 *nodes, __global const float8 *triangles, __global const float *o,
                     __global const float *d, __global uint *primitive, uint count)
 {
-    const Scene scene = {nodes, triangles};
+    const Scene scene = {.bvh_nodes = nodes, .bvh_triangles = triangles};
     const size_t i = get_global_id(0);
     if (i >= count)
         return;
@@ -105,8 +105,7 @@ class OurSide:
         flags = {"CLVOL_SPECTRUM": 1, "CLVOL_EXTINCTION": 1, "CLVOL_ONE_CHANNEL_PER_PATH": 0}
         flags |= {"CLVOL_HAS_SURFACES": 1, "CLVOL_HAS_TRIANGLES": 1, "CLVOL_HAS_QUADRICS": 0}
         flags["CLVOL_BVH_STACK"] = bvh.stack
-        scene = "typedef struct { __global const float8 *bvh_nodes, *bvh_triangles; } Scene;"
-        text = programs.expand('#include "geometry/bvh.h"\n' + KERNEL, flags, {}, scene)
+        text = programs.expand('#include "geometry/bvh.h"\n' + KERNEL, flags, {}, "")
         self.device = device
         self.kernel = cl.Kernel(programs.build(device, text, "rays"), "trace")
         self.tree = [device.memory.upload(array, "the hierarchy") for array in (bvh.nodes, bvh.packets)]

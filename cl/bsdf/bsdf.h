@@ -18,10 +18,8 @@
 /* Share of the surface that is there at all. */
 INLINE float material_opacity(const Scene *scene, __global const Material *material, float2 uv)
 {
-#if CLVOL_HAS_TEXTURES
-    if (material->opacity_texture >= 0)
+    if (CLVOL_HAS_TEXTURES && material->opacity_texture >= 0)
         return material->opacity * texture_value(scene, material->opacity_texture, uv).x;
-#endif
     return material->opacity;
 }
 

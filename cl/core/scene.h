@@ -1,5 +1,5 @@
-/* What a scene is to kernels: its buffers, and how path slots are read and written.  The text comes from
-   clvol/layout, for what the scene uses; `python tools/dump_kernel.py SCENE` shows it. */
+/* The kernels' arguments, and how path slots are read and written.  The text comes from clvol/layout, for what the
+   scene uses; `python tools/dump_kernel.py SCENE` shows it. */
 #ifndef CLVOL_CORE_SCENE_H
 #define CLVOL_CORE_SCENE_H
 #include "core/shared.h"

@@ -55,7 +55,6 @@ INLINE float3 cone_direction(const SphereCone *cone, float u, float v, float *di
     return to_frame(cone->axis, sine * turn.x, sine * turn.y, cosine);
 }
 
-#if CLVOL_HAS_AREA_MESH
 /* Uniform over a mesh: a triangle in proportion to its area, then a point of it. */
 INLINE float3 mesh_point(const Scene *scene, __global const Emitter *emitter, float choice, float u, float v, float3 *ng,
                          uint *primitive)
@@ -73,17 +72,14 @@ INLINE float3 mesh_point(const Scene *scene, __global const Emitter *emitter, fl
     *primitive = hit.primitive;
     return surface.p;
 }
-#endif
 
 /* A point uniform over the light's area, the unit normal of its front there, and the primitive it lies on. */
 INLINE float3 area_point(const Scene *scene, __global const Emitter *emitter, float choice, float u, float v, float3 *ng,
                          uint *primitive)
 {
     __global const Shape *shape = scene->shapes + emitter->shape;
-#if CLVOL_HAS_AREA_MESH
-    if (shape->kind == SURFACE_MESH)
+    if (CLVOL_HAS_AREA_MESH && shape->kind == SURFACE_MESH)
         return mesh_point(scene, emitter, choice, u, v, ng, primitive);
-#endif
     *primitive = emitter->primitive;
     __global const float *world = shape->world_from_local, *inverse = shape->local_from_world;
     const float2 turn = cos_sin_turn(v);

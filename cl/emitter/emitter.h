@@ -52,8 +52,8 @@ INLINE LightSample sample_light(const Scene *scene, float3 from, float choice, f
     LightSample light;
     light.distance = INFINITY;
     light.pdf = 0.0f;
-#if CLVOL_HAS_AREA
     light.primitive = NO_PRIMITIVE;
+#if CLVOL_HAS_AREA
     if (emitter->kind == EMITTER_AREA) {
         sample_area(scene, emitter, from, choice, u, v, &light);
         return light;

@@ -8,9 +8,7 @@ typedef struct {
     float distance;   /* to the light's point */
     float3 value;     /* light arriving, over the probability of this choice */
     float pdf;        /* of the direction, choice of light included; 0: no other way to find it (no MIS) */
-#if CLVOL_HAS_AREA
-    uint primitive; /* that the light's point lies on; NO_PRIMITIVE where the light is no surface */
-#endif
+    uint primitive;   /* that the light's point lies on; NO_PRIMITIVE where the light is no surface */
 } LightSample;
 
 INLINE float3 emitter_value(__global const Emitter *emitter)

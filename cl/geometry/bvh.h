@@ -104,9 +104,7 @@ INLINE bool is_next(float t, uint primitive, float after_t, uint after_primitive
 typedef struct {
     Ray ray;
     Slabs slabs;
-#if CLVOL_HAS_TRIANGLES
-    Shear shear;
-#endif
+    Shear shear; /* for triangles */
     float after_t;
     uint after_primitive;
     Hit best; /* before anything is found, a bound: (t_max, 0), which no hit shares */
@@ -118,9 +116,8 @@ INLINE Query query_begin(Ray ray, float after_t, uint after_primitive, float t_m
     Query query;
     query.ray = ray;
     query.slabs = slabs_of(ray);
-#if CLVOL_HAS_TRIANGLES
-    query.shear = shear_of(ray);
-#endif
+    if (CLVOL_HAS_TRIANGLES)
+        query.shear = shear_of(ray);
     query.after_t = after_t;
     query.after_primitive = after_primitive;
     query.best.t = t_max;
@@ -141,7 +138,6 @@ INLINE void query_offer(Query *query, float t, uint primitive, float u, float v)
     }
 }
 
-#if CLVOL_HAS_TRIANGLES
 INLINE void test_triangles(__global const float8 *packet, Query *query)
 {
     const PacketHits hits = packet_hits(packet, &query->shear);
@@ -163,16 +159,13 @@ INLINE void test_triangles(__global const float8 *packet, Query *query)
         query_offer(query, t[lane], primitives[lane], v[lane] / det[lane], w[lane] / det[lane]);
     }
 }
-#endif
 
 INLINE void test_leaf(const Scene *scene, uint reference, Query *query)
 {
     __global const float8 *packet = scene->bvh_triangles + (size_t)(reference & BVH_NUMBER) * BVH_PACKET_ROWS;
-#if CLVOL_HAS_TRIANGLES
-    test_triangles(packet, query);
-#endif
-#if CLVOL_HAS_QUADRICS
-    if (reference & BVH_HAS_QUADRICS) {
+    if (CLVOL_HAS_TRIANGLES)
+        test_triangles(packet, query);
+    if (CLVOL_HAS_QUADRICS && (reference & BVH_HAS_QUADRICS)) {
         const uint triangles = ((__global const uint *)(scene->bvh_nodes + 7))[0];
         __global const uint *primitives = (__global const uint *)(packet + 9);
         for (uint lane = 0u; lane < BVH_PACKET; ++lane) {
@@ -184,7 +177,6 @@ INLINE void test_leaf(const Scene *scene, uint reference, Query *query)
             query_offer(query, t.y, primitive, 0.0f, 0.0f);
         }
     }
-#endif
 }
 
 /* A node that waits: its entry's bits above its reference, so that they compare as the entries do. */

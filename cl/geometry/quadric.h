@@ -5,8 +5,8 @@
    that a far origin costs no digits, and the root that would cancel from the product of both. */
 #ifndef CLVOL_GEOMETRY_QUADRIC_H
 #define CLVOL_GEOMETRY_QUADRIC_H
-#if CLVOL_HAS_QUADRICS
-#include "core/scene.h"
+#include "core/shared.h"
+#include "core/types.h"
 
 #define NEVER ((float2)(INFINITY, INFINITY))
 
@@ -51,5 +51,4 @@ INLINE float2 quadric_hits(__global const Quadric *quadric, Ray ray)
     return (float2)(on_cylinder(local_ray, t.x) ? t.x : INFINITY, on_cylinder(local_ray, t.y) ? t.y : INFINITY);
 }
 
-#endif
 #endif

@@ -2,7 +2,8 @@
 #ifndef CLVOL_GEOMETRY_SPAN_H
 #define CLVOL_GEOMETRY_SPAN_H
 #if CLVOL_HAS_MEDIA
-#include "core/scene.h"
+#include "core/shared.h"
+#include "core/types.h"
 
 /* Cuts [t0, t1] to one slab.  A ray along it, which over the box's length moves by no more than rounding, is all in or all
    out: of the slab's two faces the lower counts, the upper does not, to rounding, so that of boxes side by side one
@@ -61,7 +62,6 @@ INLINE void clip_medium(__global const Medium *medium, Ray ray, float *t0, float
     }
 }
 
-#if CLVOL_HAS_THIN
 /* How far along the ray it comes closest to the middle of the medium's shape or box, as they measure. */
 INLINE float nearest_approach(__global const Medium *medium, Ray ray)
 {
@@ -74,7 +74,6 @@ INLINE float nearest_approach(__global const Medium *medium, Ray ray)
     }
     return max_of(-dot(local_ray.o, local_ray.d) / dot(local_ray.d, local_ray.d), 0.0f);
 }
-#endif
 
 /* The segment of a ray inside a medium, as two numbers.  Of one that is thin beside the scene, entry and exit are
    measured from a point of the ray close by: from afar they differ by less than rounding. */
@@ -86,11 +85,8 @@ typedef struct {
 /* The point of the ray that the span is measured from. */
 INLINE float3 span_origin(const Span *span, Ray ray)
 {
-#if CLVOL_HAS_THIN
-    return fma((float3)(span->base), ray.d, ray.o); /* rounded once, however far the ray has come */
-#else
-    return ray.o;
-#endif
+    /* rounded once, however far the ray has come */
+    return CLVOL_HAS_THIN ? fma((float3)(span->base), ray.d, ray.o) : ray.o;
 }
 
 INLINE float span_t(const Span *span) { return CLVOL_HAS_THIN ? span->base + span->start : span->start; }
@@ -100,11 +96,9 @@ INLINE float3 span_point(const Span *span, Ray ray) { return span_origin(span, r
 INLINE bool medium_span(__global const Medium *medium, Ray ray, float from, float to, Span *span)
 {
     span->base = 0.0f;
-#if CLVOL_HAS_THIN
-    if (medium->thin)
+    if (CLVOL_HAS_THIN && medium->thin)
         span->base = nearest_approach(medium, ray);
     ray.o = span_origin(span, ray);
-#endif
     span->start = CLVOL_HAS_THIN ? from - span->base : from;
     span->end = CLVOL_HAS_THIN ? to - span->base : to;
     clip_medium(medium, ray, &span->start, &span->end);

@@ -49,17 +49,11 @@ INLINE void set_frame(Surface *surface, float3 n, float3 dp_du)
 /* The shape that a primitive belongs to. */
 INLINE uint primitive_shape(const Scene *scene, uint primitive)
 {
-#if CLVOL_HAS_QUADRICS
-    const uint triangles = scene->render->triangles;
-    if (!CLVOL_HAS_TRIANGLES || primitive >= triangles)
-        return scene->quadrics[primitive - triangles].shape;
-#endif
-#if CLVOL_HAS_TRIANGLES
+    if (CLVOL_HAS_QUADRICS && (!CLVOL_HAS_TRIANGLES || primitive >= scene->render->triangles))
+        return scene->quadrics[primitive - scene->render->triangles].shape;
     return scene->faces[4 * primitive + 3];
-#endif
 }
 
-#if CLVOL_HAS_TRIANGLES
 INLINE float3 vertex(const Scene *scene, uint number) { return vload3(number, scene->vertices); }
 
 INLINE void triangle_surface(const Scene *scene, const Hit *hit, __global const Shape *shape, Surface *surface)
@@ -73,8 +67,7 @@ INLINE void triangle_surface(const Scene *scene, const Hit *hit, __global const 
     surface->span = span_of(surface->ng, a, e1, e2);
     surface->uv = (float2)(u, v);
     float3 dp_du = e1;
-#if CLVOL_HAS_VERTEX_UVS
-    if (shape->uvs) {
+    if (CLVOL_HAS_VERTEX_UVS && shape->uvs) {
         const float2 ta = vload2(face[0], scene->uvs), tb = vload2(face[1], scene->uvs), tc = vload2(face[2], scene->uvs);
         const float2 d1 = tb - ta, d2 = tc - ta;
         const float determinant = d1.x * d2.y - d1.y * d2.x;
@@ -82,26 +75,21 @@ INLINE void triangle_surface(const Scene *scene, const Hit *hit, __global const 
         if (determinant != 0.0f)
             dp_du = (d2.y * e1 - d1.y * e2) / determinant;
     }
-#endif
     float3 n = surface->ng;
-#if CLVOL_HAS_SHADING_NORMALS
-    if (shape->normals) {
+    if (CLVOL_HAS_SHADING_NORMALS && shape->normals) {
         const float3 smooth = w * vload3(face[0], scene->normals) + u * vload3(face[1], scene->normals) +
                               v * vload3(face[2], scene->normals);
         const float square = dot(smooth, smooth);
         if (square > 0.0f)
             n = smooth / sqrt(square);
     }
-#endif
     if (shape->flip) {
         surface->ng = -surface->ng;
         n = -n;
     }
     set_frame(surface, n, dp_du);
 }
-#endif
 
-#if CLVOL_HAS_QUADRICS
 INLINE void quadric_surface(const Scene *scene, Ray ray, const Hit *hit, __global const Shape *shape, Surface *surface)
 {
     float3 p = transform_point(shape->local_from_world, ray.o + hit->t * ray.d);
@@ -140,22 +128,16 @@ INLINE void quadric_surface(const Scene *scene, Ray ray, const Hit *hit, __globa
     surface->span = span_of(n, (float3)(w[3], w[7], w[11]), surface->p - (float3)(w[3], w[7], w[11]), (float3)(0.0f));
     set_frame(surface, n, transform_vector(shape->world_from_local, dp_du));
 }
-#endif
 
 INLINE Surface hit_surface(const Scene *scene, Ray ray, const Hit *hit)
 {
     Surface surface;
     surface.shape = primitive_shape(scene, hit->primitive);
     __global const Shape *shape = scene->shapes + surface.shape;
-#if CLVOL_HAS_QUADRICS
-    if (!CLVOL_HAS_TRIANGLES || shape->kind != SURFACE_MESH) {
+    if (CLVOL_HAS_QUADRICS && (!CLVOL_HAS_TRIANGLES || shape->kind != SURFACE_MESH))
         quadric_surface(scene, ray, hit, shape, &surface);
-        return surface;
-    }
-#endif
-#if CLVOL_HAS_TRIANGLES
-    triangle_surface(scene, hit, shape, &surface);
-#endif
+    else
+        triangle_surface(scene, hit, shape, &surface);
     return surface;
 }
 

@@ -6,7 +6,6 @@
    holds only while nothing is fused: FP_CONTRACT is off in whatever computes with vertices. */
 #ifndef CLVOL_GEOMETRY_TRIANGLE_H
 #define CLVOL_GEOMETRY_TRIANGLE_H
-#if CLVOL_HAS_TRIANGLES
 #include "core/types.h"
 
 /* What a ray brings to every triangle: which axes are sheared x, y, z, and by how much. */
@@ -84,5 +83,4 @@ INLINE float8 packet_t(__global const float8 *packet, const PacketHits *hits, co
     return (usable ? distance_ : hits->depth) / (usable ? along : hits->det);
 }
 
-#endif
 #endif

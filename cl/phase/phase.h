@@ -34,14 +34,12 @@ INLINE float3 lobe_sample(__global const Phase *lobe, float3 wo, float u, float 
 INLINE float phase_pdf(const Scene *scene, __global const Medium *medium, float3 wo, float3 wi)
 {
     __global const Phase *lobes = scene->phases + medium->phase_first;
-#if CLVOL_HAS_BLEND
+    if (!CLVOL_HAS_BLEND)
+        return lobe_pdf(lobes, wo, wi);
     float pdf = 0.0f;
     for (int n = 0; n < medium->phase_count; ++n)
         pdf += lobes[n].weight * lobe_pdf(lobes + n, wo, wi);
     return pdf;
-#else
-    return lobe_pdf(lobes, wo, wi);
-#endif
 }
 
 /* `choice` in (0, 1) picks the lobe.  The rarest comes first, where small numbers resolve its weight; the last
@@ -50,18 +48,14 @@ INLINE float3 phase_sample(const Scene *scene, __global const Medium *medium, fl
                            float choice, float *pdf)
 {
     __global const Phase *lobe = scene->phases + medium->phase_first;
-#if CLVOL_HAS_BLEND
-    for (int left = medium->phase_count - 1; left > 0 && choice >= lobe->weight; --left) {
+    for (int left = CLVOL_HAS_BLEND ? medium->phase_count - 1 : 0; left > 0 && choice >= lobe->weight; --left) {
         choice -= lobe->weight;
         ++lobe;
     }
     const float3 wi = lobe_sample(lobe, wo, u, v, pdf);
-    if (medium->phase_count > 1)
+    if (CLVOL_HAS_BLEND && medium->phase_count > 1)
         *pdf = phase_pdf(scene, medium, wo, wi);
     return wi;
-#else
-    return lobe_sample(lobe, wo, u, v, pdf);
-#endif
 }
 
 #endif

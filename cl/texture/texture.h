@@ -6,8 +6,6 @@
 #define CLVOL_TEXTURE_TEXTURE_H
 #include "core/scene.h"
 
-#if CLVOL_HAS_TEXTURES
-#if CLVOL_HAS_BITMAPS
 INLINE int wrapped(int index, int count, int wrap)
 {
     if (wrap == WRAP_CLAMP)
@@ -38,7 +36,6 @@ INLINE float3 bitmap_value(const Scene *scene, __global const Texture *texture, 
     const float3 lower = start + fx * (vload3(next + right, scene->texels) - start);
     return upper + fy * (lower - upper);
 }
-#endif
 
 INLINE float3 texture_value(const Scene *scene, int number, float2 surface_uv)
 {
@@ -46,22 +43,17 @@ INLINE float3 texture_value(const Scene *scene, int number, float2 surface_uv)
     __global const float *m = texture->to_uv;
     const float2 uv = (float2)(m[0] * surface_uv.x + m[1] * surface_uv.y + m[2],
                                m[3] * surface_uv.x + m[4] * surface_uv.y + m[5]);
-#if CLVOL_HAS_BITMAPS
-    if (texture->kind == TEXTURE_BITMAP)
+    if (CLVOL_HAS_BITMAPS && texture->kind == TEXTURE_BITMAP)
         return bitmap_value(scene, texture, uv);
-#endif
     const bool right = uv.x - (float)floor_int(uv.x) > 0.5f, upper = uv.y - (float)floor_int(uv.y) > 0.5f;
     return load_vector(right == upper ? texture->color0 : texture->color1);
 }
-#endif
 
 /* A colour of a material: that of its texture where it has one, as the path carries it. */
 INLINE Spectrum material_color(const Scene *scene, __global const float *base, int texture, float2 uv, int channel)
 {
-#if CLVOL_HAS_TEXTURES
-    if (texture >= 0)
+    if (CLVOL_HAS_TEXTURES && texture >= 0)
         return to_spectrum(texture_value(scene, texture, uv), channel);
-#endif
     return to_spectrum(load_vector(base), channel);
 }
 

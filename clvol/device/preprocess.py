@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 
 _DIRECTIVE = re.compile(r"^\s*#\s*(include|ifdef|ifndef|if|elif|else|endif)\b\s*(.*?)\s*(?:/\*.*)?$")
 _IDENTIFIER = re.compile(r"\b[A-Za-z_]\w*\b")
-_NOTHING = re.compile(r"\s+|/\*.*?\*/|#line[^\n]*|#ifndef (\w+_H)\n#define \1\n|#endif[^\n]*", re.DOTALL)
+_NOTHING = re.compile(
+    r"(?:\s++|/\*.*?\*/|#line[^\n]*+|#ifndef (\w+_H)\n#define \1\n|#endif[^\n]*+)*+", re.DOTALL
+)
 """What is left of a file that holds nothing."""
 
 
@@ -74,20 +76,24 @@ class Preprocessor:
             return []
         self._seen.add(name)
         lines = self.expand(self.read(name), name)
-        return lines if _NOTHING.sub("", "\n".join(lines) + "\n") else []
+        return [] if _NOTHING.fullmatch("\n".join(lines) + "\n") else lines
 
     def expand(self, text: str, name: str) -> list[str]:
         """Lines of `text`, which messages call `name`."""
         lines = _Lines(name)
         conditionals: list[_Conditional] = []
+        active = True
         for number, line in enumerate(text.splitlines(), 1):
-            match = _DIRECTIVE.match(line)
+            match = _DIRECTIVE.match(line) if "#" in line else None
             if match and match[1] == "include":
-                if all(c.active for c in conditionals):
+                if active:
                     lines.insert(self.file(self._target(match[2])))
                 continue
-            kept = self._branch(match[1], match[2], line, conditionals) if match else line
-            if kept is not None and all(c.active for c in conditionals):
+            kept: str | None = line
+            if match:
+                kept = self._branch(match[1], match[2], line, conditionals)
+                active = all(c.active for c in conditionals)
+            if active and kept is not None:
                 lines.keep(number, kept)
         return lines.kept
 

@@ -1,4 +1,4 @@
-"""OpenCL text of what host and device share whatever the scene: records, numbered kinds, numbers."""
+"""OpenCL text of what host and device share whatever the scene: records, numbered kinds, the Scene."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from clvol.layout import constants
+from clvol.layout.arguments import ARGUMENTS
 from clvol.layout.bsdfs import BSDF_FACTS
 from clvol.layout.records import ENUMS, RECORDS
 
@@ -44,13 +45,15 @@ def record_text(name: str, dtype: np.dtype[Any]) -> str:
 
 @cache
 def shared_text() -> str:
-    """Every record, enum and number: cl/core/shared.h."""
+    """Every record, enum and number, and the Scene, which has room for all buffers: cl/core/shared.h."""
     parts = [record_text(name, dtype) for name, dtype in RECORDS.items()]
     for family, names in ENUMS.items():
         parts += [f"#define {family}_{name.upper()} {value}" for value, name in enumerate(names)]
     for name in _NUMBERS:
         value = getattr(constants, name)
         parts.append(f"#define {name} {value}" if value < 1 << 16 else f"#define {name} 0x{value:08X}u")
+    members = "\n".join(f"    {argument.c_type} {argument.name};" for argument in ARGUMENTS)
+    parts.append(f"typedef struct {{\n{members}\n}} Scene;")
     return "\n".join(parts) + "\n"
 
 

@@ -37,11 +37,9 @@ def layout_text(macros: Macros, stage: Stage | None = None) -> str:
 
 
 def _scene_text(macros: Macros) -> list[str]:
-    """The kernels' arguments, and the Scene that holds them; what is no argument is null there."""
+    """The kernels' arguments, and what a Scene is of them; what is no argument is null there."""
     args = arguments(macros)
-    members = "\n".join(f"    {a.c_type} {a.name};" for a in ARGUMENTS)
     return [
-        f"typedef struct {{\n{members}\n}} Scene;",
         "#define CLVOL_ARGUMENTS " + ", ".join(f"{a.c_type} {a.name}_" for a in args),
         "#define CLVOL_SCENE {" + ", ".join(f"{a.name}_" if a in args else "0" for a in ARGUMENTS) + "}",
     ]

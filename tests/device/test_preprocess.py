@@ -102,11 +102,14 @@ def everything(**features):
 
 @pytest.mark.parametrize("folder", sorted({name.split("/")[0] for name in HEADERS}))
 def test_every_header_includes_what_it_uses(device, folder):
-    """Each compiles by itself."""
+    """Each compiles by itself, those of a stage with its contract."""
     plan = everything()
+    contracts = {f"stages/{stage.name}.h": stage for stage in layout.STAGES}
+    contracts["stages/segment_sample.h"] = layout.stage("medium_sample")
     for name in HEADERS:
         if name.startswith(f"{folder}/"):
-            unit = programs.compose(plan, f'#include "{name}"\n__kernel void nothing(void) {{}}\n')
+            text = f'#include "{name}"\n__kernel void nothing(void) {{}}\n'
+            unit = programs.compose(plan, text, stage=contracts.get(name))
             assert f'"{name}"' in unit, f"{name} is empty"
             programs.build(device, unit, name)
 
@@ -114,7 +117,50 @@ def test_every_header_includes_what_it_uses(device, folder):
 def test_every_file_is_included_by_another_or_fills_a_slot():
     included = {name for text in TEXTS.values() for name in re.findall(r'#include "(.+)"', text)}
     chosen = {choice.header for family in registry.FAMILIES.values() for choice in family.values()}
+    chosen |= {f"stages/{stage.name}.h" for stage in layout.STAGES}
     assert set(HEADERS) - included - chosen == {"majorant/tree_grid.h"}, (
         "that one, grids of sparse volumes take"
     )
     assert included <= set(HEADERS)
+
+
+CODE = {name: re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL) for name, text in TEXTS.items()}
+ALL = "\n".join(CODE.values())
+
+
+def test_nothing_is_defined_that_nothing_uses():
+    defined = {
+        (name, word)
+        for name, text in CODE.items()
+        for word in re.findall(r"^INLINE [^\n(]*?\b(\w+)\(|^\s*#define (\w+)|^\} (\w+);", text, re.M)
+        for word in word
+        if word and not word.endswith("_H")
+    }
+    assert len(defined) > 300
+    plan = everything()
+    text = ALL + "".join(layout.stage_text(plan.macros, stage) for stage in layout.STAGES)
+    assert [place for place in sorted(defined) if len(re.findall(rf"\b{place[1]}\b", text)) == 1] == []
+
+
+def test_every_macro_is_known_and_used():
+    plan = everything()
+    generated = "\n".join(
+        (layout.layout_text(plan.macros), layout.kinds_text("BSDF"), layout.kinds_text("PHASE"))
+    )
+    tables = {a.needs for a in layout.ARGUMENTS} | {
+        m for f in layout.PATH_STATE for m in (*f.needs, f.unless, f.times)
+    }
+    used = set(re.findall(r"\bCLVOL_\w+", ALL + generated)) | tables
+    unused = {name for name in plan.macros if name not in used and not name.startswith("CLVOL_SHOWS_")}
+    assert not unused
+    made = set(re.findall(r"#define (\w+)", ALL + generated)) | {
+        *(f"CLVOL_{slot.upper()}_HEADER" for slot in plan.slots),
+        *programs.SHARED,
+    }
+    unknown = {n for n in re.findall(r"\bCLVOL_\w+", ALL) if n not in plan.macros and n not in made}
+    assert {n for n in unknown if not n.startswith("CLVOL_RAY_")} == {
+        "CLVOL_BSDF_",  # pasted, as the next
+        "CLVOL_PHASE_",
+        "CLVOL_LAYOUT_HEADER",
+        "CLVOL_CONTRACT_HEADER",
+    }

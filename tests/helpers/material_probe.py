@@ -28,7 +28,8 @@ __kernel void sample_probe(SCENE, __global const int *number, __global const flo
                            __global const float *wi, __global const float *random, __global float *out,
                            uint count)
 {
-    const Scene scene = {materials_, textures_, texels_, material_tables_};
+    const Scene scene = {.materials = materials_, .textures = textures_, .texels = texels_,
+                         .material_tables = material_tables_};
     const uint i = get_global_id(0);
     if (i >= count)
         return;
@@ -49,7 +50,8 @@ __kernel void sample_probe(SCENE, __global const int *number, __global const flo
 __kernel void value_probe(SCENE, __global const int *number, __global const float *uv,
                           __global const float *wi, __global const float *wo, __global float *out, uint count)
 {
-    const Scene scene = {materials_, textures_, texels_, material_tables_};
+    const Scene scene = {.materials = materials_, .textures = textures_, .texels = texels_,
+                         .material_tables = material_tables_};
     const uint i = get_global_id(0);
     if (i >= count)
         return;
@@ -67,7 +69,8 @@ __kernel void value_probe(SCENE, __global const int *number, __global const floa
 __kernel void texture_probe(SCENE, __global const int *number, __global const float *uv, __global float *out,
                             uint count)
 {
-    const Scene scene = {materials_, textures_, texels_, material_tables_};
+    const Scene scene = {.materials = materials_, .textures = textures_, .texels = texels_,
+                         .material_tables = material_tables_};
     const uint i = get_global_id(0);
     if (i < count)
         vstore3(texture_value(&scene, number[i], vload2(i, uv)), i, out);
@@ -89,10 +92,9 @@ def source(kinds, channel=None, textures=True):
     defines |= {"CLVOL_SPECTRUM": 3 if channel is None else 1, "CLVOL_ONE_CHANNEL_PER_PATH": 1}
     buffers = ("const Material *materials", "const Texture *textures", "const float *texels")
     buffers = [f"__global {buffer}" for buffer in (*buffers, "const float *material_tables")]
-    lines = ["typedef struct {" + "".join(f"{buffer}; " for buffer in buffers) + "} Scene;"]
-    lines.append("#define SCENE " + ", ".join(f"{buffer}_" for buffer in buffers))
-    lines.append(f"#define CHANNEL {channel or 0}")
-    return programs.expand('#include "bsdf/bsdf.h"\n' + BODY, defines, {}, "\n".join(lines))
+    scene = "#define SCENE " + ", ".join(f"{buffer}_" for buffer in buffers)
+    text = f'#include "bsdf/bsdf.h"\n{scene}\n#define CHANNEL {channel or 0}\n{BODY}'
+    return programs.expand(text, defines, {}, "")
 
 
 class Samples:

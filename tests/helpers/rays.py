@@ -37,7 +37,8 @@ _ARGUMENTS = (
     "__global const float *o, __global const float *d"
 )
 _BEGIN = (
-    "const Scene scene = {nodes, triangles, quadrics}; const size_t i = get_global_id(0); "
+    "const Scene scene = {.bvh_nodes = nodes, .bvh_triangles = triangles, .quadrics = quadrics}; "
+    "const size_t i = get_global_id(0); "
     "const Ray ray = {vload3(i, o), vload3(i, d)};"
 )
 
@@ -48,12 +49,8 @@ def ray_source(stack, triangles=True, quadrics=False, kernels=_KERNELS):
     flags |= {"CLVOL_HAS_TRIANGLES": int(triangles), "CLVOL_HAS_QUADRICS": int(quadrics)}
     flags |= {"CLVOL_BVH_STACK": stack}
     flags |= {"CLVOL_HAS_SURFACES": 1}
-    scene = (
-        "typedef struct { __global const float8 *bvh_nodes, *bvh_triangles; "
-        "__global const Quadric *quadrics; } Scene;"
-    )
     text = kernels.replace("ARGUMENTS", _ARGUMENTS).replace("BEGIN", _BEGIN)
-    return programs.expand('#include "geometry/bvh.h"\n' + text, flags, {}, scene)
+    return programs.expand('#include "geometry/bvh.h"\n' + text, flags, {}, "")
 
 
 def directions(generator, count):
