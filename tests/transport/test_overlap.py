@@ -153,15 +153,15 @@ def test_overlapping_media_glow_and_scatter_as_their_sum(case):
     )
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("case", CASES, ids="-".join)
 def test_overlapping_media_in_their_own_radiance_do_not_show(case):
     assert_matches(in_their_own_radiance(*case), 1.0, bias=0.01)
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("kind", Layers.kinds)
-@pytest.mark.parametrize(
-    "pictures", [pytest.param(scattered_once, marks=pytest.mark.contract), in_their_own_radiance]
-)
+@pytest.mark.parametrize("pictures", [scattered_once, in_their_own_radiance])
 def test_no_bias_is_shared_by_all_techniques(pictures, kind):
     answer = Layers(kind).answer(4.0) if pictures is scattered_once else 1.0
     assert_pooled([(pictures(*case), answer) for case in CASES if case[0] == kind])
