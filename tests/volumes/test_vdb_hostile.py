@@ -128,9 +128,13 @@ print(refused)
 
 
 def test_20000_damaged_blosc_chunks_do_not_crash_the_c_library():
-    root = ROOT
     run = subprocess.run(
-        [sys.executable, "-c", FUZZ_BLOSC], cwd=root, capture_output=True, text=True, timeout=120, check=False
+        [sys.executable, "-c", FUZZ_BLOSC],
+        cwd=SCENES.parent,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
     )
     assert run.returncode == 0, run.stderr
     assert int(run.stdout) > 5_000
