@@ -381,7 +381,7 @@ def test_what_shade_handles_comes_with_what_paths_can_meet(device):
 )
 def test_only_the_bsdfs_of_a_scene_are_composed(device, bsdf, files):
     plan = plan_of(device, scene([replace(PLAIN, bsdf=bsdf)], [SKY]))
-    assert held(plan, "bsdf/") == {f"bsdf/{name}.h" for name in files | {"bsdf", "sample"}}
+    assert held(plan, "bsdf/") == {f"bsdf/{name}.h" for name in files | {"bsdf", "kinds", "sample"}}
 
 
 def test_what_only_passable_or_transmissive_surfaces_need_comes_with_them(device):
