@@ -79,7 +79,7 @@ def render(
         Seconds after which no new pass of samples is begun. Alone it replaces `spp`. Passes begun are
         finished, unless paths go on for more than 10 seconds (30 where no pass is finished yet).
     target_error
-        Mean relative standard error (`Result.noise`) at which the render ends. A pilot that is not in the
+        Mean relative standard error (`Result.noise`) at which the render ends. A survey that is not in the
         picture judges it, and pixels get samples by their noise. `spp` then is the most on the mean.
     device
         Index or part of the name of an OpenCL device (see `clvol devices`).

@@ -2,7 +2,7 @@
 
 Every box that halving the lattice can make is weighed, smallest first: as one leaf, or split along x, y
 or z into the best trees of its halves, whichever costs a random ray least.  By integral geometry
-(clvol.accel.choice) a leaf costs its volume × looseness in look-ups and a quarter of its surface in visits;
+(clvol.accel.costs) a leaf costs its volume × looseness in look-ups and a quarter of its surface in visits;
 a visit starts at the root, so that each split adds a step to every visit below it.  The looseness is the
 technique's (clvol.accel.controls): the majorant, less the control that decomposition subtracts.
 """

@@ -1,6 +1,6 @@
 """Rendering to a target error: samples go where the error is, and end when it is small enough.
 
-A pilot with a seed of its own tells how noisy each pixel is.  It alone decides how many samples a pixel gets
+A survey with a seed of its own tells how noisy each pixel is.  It alone decides how many samples a pixel gets
 and when to stop: none of these decisions has to do with the values of the samples in the picture, which
 therefore stays unbiased (Kirk and Arvo 1991, "Unbiased sampling techniques for image synthesis").
 """
@@ -27,17 +27,17 @@ log = logging.getLogger("clvol")
 CHUNK = 8
 """Independent samples are given out in multiples of so many."""
 LEAST = 16
-"""No pixel gets fewer, but for a lower cap, nor the first pilot."""
+"""No pixel gets fewer, but for a lower cap, nor the first survey."""
 BLIND = 256
-"""Samples a pixel after which a pilot that saw no light gives up: light may be rare."""
-PILOT_SHARE = 8
-"""The picture has at most so many times the pilot's samples, lest a pilot too short decide on too many."""
-PILOT_GROWTH = 4
-"""Each pilot has at most so many times the samples of the one before, lest it take all of a time limit."""
+"""Samples a pixel after which a survey that saw no light gives up: light may be rare."""
+SURVEY_SHARE = 8
+"""The picture has at most so many times the survey's samples, lest a survey too short decide on too many."""
+SURVEY_GROWTH = 4
+"""Each survey has at most so many times the samples of the one before, lest it take all of a time limit."""
 _SMOOTHED = 5
 """Edge, in pixels, of the square that a pixel's variance is averaged over: single ones are rough."""
-_PILOT_SEED = 0x9E3779B97F4A7C15
-"""Added to the seed of the picture for the pilot's."""
+_SURVEY_SEED = 0x9E3779B97F4A7C15
+"""Added to the seed of the picture for the survey's."""
 _HALVINGS = 16
 """Of the interval in which a factor is sought: to 5 digits."""
 
@@ -130,20 +130,20 @@ def _change(before: Callable[[float], bool]) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class TargetProgress(Progress):
-    """How far a render to a target error is; the time left is that of the pilots too.
+    """How far a render to a target error is; the time left is that of the surveys too.
 
     Parameters
     ----------
-    pilot : (int, int)
-        Samples per pixel of the pilot: finished so far, and expected in all.
+    survey : (int, int)
+        Samples per pixel of the survey: finished so far, and expected in all.
     """
 
-    pilot: tuple[int, int] = (0, 0)
+    survey: tuple[int, int] = (0, 0)
 
     @property
     def _work(self) -> Progress:
-        total = None if self.samples_total is None else self.samples_total + self.pilot[1]
-        return Progress(self.samples_done + self.pilot[0], total, self.seconds, self.time_limit)
+        total = None if self.samples_total is None else self.samples_total + self.survey[1]
+        return Progress(self.samples_done + self.survey[0], total, self.seconds, self.time_limit)
 
     @property
     def fraction(self) -> float:
@@ -163,13 +163,13 @@ class TargetRender:
         self.session, self.target, self.most = session, target, most
         self.wavefront = session.wavefront
         self.picture = self.wavefront.film
-        self.pilot = self.wavefront.new_film(seed_words((session.seed + _PILOT_SEED) % 2**64))
+        self.survey = self.wavefront.new_film(seed_words((session.seed + _SURVEY_SEED) % 2**64))
         self.low_discrepancy = bool(session.plan.randomizations)
         self.rounding = powers_of_two if self.low_discrepancy else chunks
         self.expected: float | None = None
         """Mean of the samples that the picture will have, by the last plan."""
         self.noise, self.level = np.zeros(self.wavefront.pixels), 0.0
-        """By the last pilot: standard deviation of a sample of each pixel, and the sum of the radiance."""
+        """By the last survey: standard deviation of a sample of each pixel, and the sum of the radiance."""
 
     def run(
         self,
@@ -177,17 +177,17 @@ class TargetRender:
         callback: ProgressCallback | None,
         interrupted: Callable[[], int],
     ) -> int:
-        """Render until the pilot says that the error is below the target; returns the mean of the samples."""
+        """Render until the survey says that the error is below the target; return the mean of the samples."""
         self.started = time.perf_counter()
         self.time_limit, self.callback, self.interrupted = time_limit, callback, interrupted
         everywhere, final = np.ones(self.wavefront.pixels, np.int64), False
         while not (final or self._stopped()):
-            self._add(self.pilot, self._next_pilot() * everywhere)
+            self._add(self.survey, self._next_survey() * everywhere)
             if not self._stopped():
                 plan, final = self._plan()
                 self._add(self.picture, plan.min() * everywhere)  # an early end leaves no pixel without
                 self._add(self.picture, plan)
-        if not self.picture.samples.all():  # not even the pilot was finished in time
+        if not self.picture.samples.all():  # not even the survey was finished in time
             self._add(self.picture, CHUNK * everywhere)
         if not self.picture.samples.all():
             raise nothing_finished(interrupted())
@@ -196,19 +196,19 @@ class TargetRender:
         self._report_end()
         return round(float(self.picture.samples.mean()))
 
-    def _next_pilot(self) -> int:
+    def _next_survey(self) -> int:
         """How many samples it is to have."""
-        before = int(self.pilot.samples[0])
+        before = int(self.survey.samples[0])
         if before == 0:
             return LEAST
-        wanted = np.clip((self.expected or 0) / PILOT_SHARE, 2 * before, PILOT_GROWTH * before)
+        wanted = np.clip((self.expected or 0) / SURVEY_SHARE, 2 * before, SURVEY_GROWTH * before)
         return int(self.rounding(wanted))
 
     def _plan(self) -> tuple[np.ndarray, bool]:
         """How many samples each pixel is to have, and whether that reaches the target or the most allowed."""
         width, height = self.session.prepared.scene.film.window[2:]
-        mean, variance = self.pilot.uneven_estimate().mean_and_variance()
-        count, have = int(self.pilot.samples[0]), self.picture.samples
+        mean, variance = self.survey.uneven_estimate().mean_and_variance()
+        count, have = int(self.survey.samples[0]), self.picture.samples
         self.level = float(np.abs(mean).sum())
         self.noise = np.sqrt(_smoothed(variance * count, width, height)).sum(axis=1)
         most = np.inf if self.most is None else self.most
@@ -216,17 +216,17 @@ class TargetRender:
             final = count >= min(BLIND, most)
             if final:
                 log.warning(
-                    "the pilot of the target error saw no light in %d samples a pixel: none gets over %d",
+                    "the survey of the target error saw no light in %d samples a pixel: none gets over %d",
                     count,
                     LEAST,
                 )
             return np.full(len(have), min(LEAST, most), np.int64), final
-        # fewer low-discrepancy samples than the pilot's may be noisier than its law, variance / n, says
+        # fewer low-discrepancy samples than the survey's may be noisier than its law, variance / n, says
         least = max(LEAST, count) if self.low_discrepancy else LEAST
         allowed = self.target * self.level
         plan = np.maximum(allocate(self.noise, allowed, least, self.rounding), have)
         self.expected = min(float(plan.mean()), most)
-        mean_now = min(self.expected, PILOT_SHARE * count)
+        mean_now = min(self.expected, SURVEY_SHARE * count)
         if plan.mean() > mean_now:
             ideal = np.minimum(optimum(self.noise, allowed, least), 1e200)  # of which a mean can be taken
             plan = capped(ideal, have, int(mean_now), self.rounding)
@@ -259,17 +259,17 @@ class TargetRender:
         """Report that `added` samples of `pixels`, not yet counted by `film`, are finished."""
         if self.callback is None:
             return
-        counts, pilot = self.picture.samples, int(self.pilot.samples[0])
+        counts, survey = self.picture.samples, int(self.survey.samples[0])
         if film is self.picture:
             counts = counts.copy()
             counts[pixels] += added
         else:
-            pilot += added
+            survey += added
         done, expected = int(counts.mean()), self.expected
         total = None if expected is None else max(int(expected), done)
-        pilots = max(int(self.pilot.samples[0]), int((expected or 0) / PILOT_SHARE))
-        if film is self.pilot:
-            pilots = max(pilots, int(goal[0]))
+        surveys = max(int(self.survey.samples[0]), int((expected or 0) / SURVEY_SHARE))
+        if film is self.survey:
+            surveys = max(surveys, int(goal[0]))
         self.callback(
             TargetProgress(
                 done,
@@ -277,13 +277,13 @@ class TargetRender:
                 time.perf_counter() - self.started,
                 self.time_limit,
                 self._expected_noise(counts),
-                "rendering" if film is self.picture else "pilot",
-                (pilot, pilots),
+                "rendering" if film is self.picture else "survey",
+                (survey, surveys),
             )
         )
 
     def _expected_noise(self, counts: np.ndarray) -> float:
-        """What the last pilot says of a picture with so many samples; nan where it says nothing."""
+        """What the last survey says of a picture with so many samples; nan where it says nothing."""
         if self.level == 0.0 or not counts.all():
             return float("nan")
         return float((self.noise / np.sqrt(counts)).sum()) / self.level
@@ -293,15 +293,15 @@ class TargetRender:
         noise = relative_noise(*estimate.mean_and_variance(), estimate.dof)
         counts = self.picture.samples
         log.info(
-            "target error %.3g: noise %.3g; %d to %d samples a pixel, %.4g on the mean; pilot %d",
+            "target error %.3g: noise %.3g; %d to %d samples a pixel, %.4g on the mean; survey %d",
             self.target,
             noise,
             counts.min(),
             counts.max(),
             counts.mean(),
-            self.pilot.samples[0],
+            self.survey.samples[0],
         )
-        if not noise <= 1.05 * self.target:  # the pilot's foresight
+        if not noise <= 1.05 * self.target:  # the survey's foresight
             log.warning("the noise is %.3g, the target was %.3g", noise, self.target)
 
 

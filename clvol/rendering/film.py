@@ -1,6 +1,6 @@
 """The film on the device: what finished samples add up to, pixel by pixel.
 
-A render has one; a pilot that decides how many samples each pixel gets has another, so that none of its
+A render has one; a survey that decides how many samples each pixel gets has another, so that none of its
 samples is in the picture.
 """
 

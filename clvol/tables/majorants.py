@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from clvol.accel import choice, controls
+from clvol.accel import controls, costs
 from clvol.accel.bounds import Bounds, with_slack
 from clvol.accel.cells import Cells
 from clvol.accel.kdtree import KdTree, pack_maximum, unpack_maximum
@@ -169,13 +169,13 @@ def _candidate(one: _Walked, bounds: AnyBounds, kind: str, needs: MajorantNeeds)
     rate, technique = float(np.max(one.medium.scale)), (needs.control, needs.scale)
     if kind == "kdtree":
         bounds = finest_lattice(bounds)
-        visits = choice.LEAF_COST, choice.STEP_COST
+        visits = costs.LEAF_COST, costs.STEP_COST
         tree = build_tree(bounds, extent * bounds.cell_size, rate, *visits, *technique)
         return _Candidate(bounds, tree, tree.cost)
     if kind == "grid":
-        bounds, cost = choice.best_grid(bounds, extent * bounds.cell_size, rate, *technique)
+        bounds, cost = costs.best_grid(bounds, extent * bounds.cell_size, rate, *technique)
         return _Candidate(bounds, None, cost)
-    return _Candidate(bounds, None, choice.global_cost(bounds, extent * bounds.cell_size, rate, *technique))
+    return _Candidate(bounds, None, costs.global_cost(bounds, extent * bounds.cell_size, rate, *technique))
 
 
 def _tables(candidate: _Candidate, kind: str, needs: MajorantNeeds, longest: np.ndarray) -> PreparedMajorant:

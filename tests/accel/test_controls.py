@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from trees import leaves_of
 
-from clvol.accel import choice
+from clvol.accel import costs
 from clvol.accel.bounds import Bounds, with_slack
 from clvol.accel.controls import WEIGHT_GROWTH, control, looseness, residual, scaled_majorant
 from clvol.accel.kdtree import build_kdtree, pack_maximum, unpack_maximum
@@ -275,7 +275,7 @@ def test_a_tree_costs_what_a_recount_of_its_looseness_says(channels, kind, scale
 def test_a_tree_for_decomposition_costs_it_less_than_one_for_delta_tracking(kind):
     """Over a varying base the split that lowers the bound is not the one that lifts the control."""
     bounds = bounds_of(lumps())
-    visits = choice.LEAF_COST, choice.STEP_COST
+    visits = costs.LEAF_COST, costs.STEP_COST
     delta = build_kdtree(bounds, EXTENT, 2.0, *visits)
     own = build_kdtree(bounds, EXTENT, 2.0, *visits, kind)
     assert own.cost < 0.99 * recounted_cost(delta, bounds, EXTENT, 2.0, visits, kind, 1.0)
@@ -295,15 +295,15 @@ def test_grids_and_global_bounds_cost_their_looseness(kind):
     volume = np.prod(EXTENT)
     sides = EXTENT[0] * EXTENT[1] + EXTENT[1] * EXTENT[2] + EXTENT[2] * EXTENT[0]
     whole = reference_looseness(*recounted(bounds, (0, 0, 0), bounds.cells), kind, scale)
-    cost = choice.global_cost(bounds, EXTENT, 2.0, kind, scale)
+    cost = costs.global_cost(bounds, EXTENT, 2.0, kind, scale)
     assert cost == pytest.approx(nx * ny * nz * volume * 2.0 * whole, rel=1e-5)
     each = [
         reference_looseness(*(a[k] for a in (bounds.minimum, bounds.maximum, bounds.mean)), kind, scale)
         for k in np.ndindex(nz, ny, nx)
     ]
-    cost = choice.grid_cost(bounds, EXTENT, 2.0, kind, scale)
+    cost = costs.grid_cost(bounds, EXTENT, 2.0, kind, scale)
     assert cost == pytest.approx(
-        volume * 2.0 * sum(each) + choice.CELL_COST * 0.5 * sides * nx * ny * nz, rel=1e-5
+        volume * 2.0 * sum(each) + costs.CELL_COST * 0.5 * sides * nx * ny * nz, rel=1e-5
     )
 
 

@@ -234,17 +234,17 @@ def test_passes_over_any_list_fit_into_the_ring(device, listed):
 # -- what decides ------------------------------------------------------------------------------------
 
 
-def test_only_the_pilot_decides_how_many_samples_a_pixel_gets(half):
-    def counts(seed, pilot_seed):
+def test_only_the_survey_decides_how_many_samples_a_pixel_gets(half):
+    def counts(seed, survey_seed):
         render = started(half, seed, 0.05)
-        render.pilot.clear(seed_words(pilot_seed))
+        render.survey.clear(seed_words(survey_seed))
         render.run(None, None, lambda: False)
         return render.picture.samples, make_result(half, 0, 1).image
 
     samples, image = counts(1, 2)
     assert samples.min() == LEAST < samples.max()
-    for pilot_seed, same in ((2, True), (4, False)):
-        others, other_image = counts(3, pilot_seed)
+    for survey_seed, same in ((2, True), (4, False)):
+        others, other_image = counts(3, survey_seed)
         assert np.array_equal(others, samples) == same
         assert (other_image != image).any()
 
@@ -261,7 +261,7 @@ def relative_means(session, target, seeds, shown=False):
     for seed in range(seeds):
         render = started(session, 1000 + seed, target)
         if shown:
-            render.pilot = render.picture
+            render.survey = render.picture
         render.run(None, None, lambda: False)
         means.append(render.picture.uneven_estimate().mean.mean() / TRANSMITTED)
     return np.array(means)
@@ -311,7 +311,7 @@ def test_the_noise_is_the_target(request, which, target, least):
     """By the scatter of 20 pictures.
 
     Independent samples are not many more than needed: beside the ball the sky looks noisy to the smoothed
-    pilot.  Of low-discrepancy ones less is asked, the pilot's law being too pessimistic.
+    survey.  Of low-discrepancy ones less is asked, the survey's law being too pessimistic.
     """
     session = request.getfixturevalue(which)
     pictures, told = [], []
@@ -329,23 +329,23 @@ def test_the_noise_is_the_target(request, which, target, least):
 
 
 def test_a_quiet_half_saves_samples(device):
-    """The pilot's counted: against an even render of the same noise."""
+    """The survey's counted: against an even render of the same noise."""
     target, session = 0.01, opened(device, halves(48))
     render = finished(session, 3, target)
     samples = render.picture.samples.reshape(48, 48)
     assert (samples[:, :12] == LEAST).all()
     assert samples[24, 36] > 10 * LEAST
-    spent = samples.mean() + render.pilot.samples.mean()
+    spent = samples.mean() + render.survey.samples.mean()
     even = in_lists(session, 3, 64)
     assert spent < 0.8 * 64 * (even.noise / target) ** 2
 
 
 def test_low_discrepancy_samples_come_in_powers_of_two(sobol):
-    """Others are noisier than half as many: what the pilot says of them would not hold."""
+    """Others are noisier than half as many: what the survey says of them would not hold."""
     render = finished(sobol, 3, 0.03)
-    for counts in (render.picture.samples, render.pilot.samples):
+    for counts in (render.picture.samples, render.survey.samples):
         assert (np.bitwise_count(counts) == 1).all()
-    assert render.picture.samples.min() >= render.pilot.samples.max()
+    assert render.picture.samples.min() >= render.survey.samples.max()
 
 
 # -- ends --------------------------------------------------------------------------------------------
@@ -353,11 +353,11 @@ def test_low_discrepancy_samples_come_in_powers_of_two(sobol):
 
 @pytest.mark.parametrize("most", [1, 5, 20, 300])
 def test_spp_is_the_most_on_the_mean(half, most):
-    """A target out of reach: its pilots keep to the cap too."""
+    """A target out of reach: its surveys keep to the cap too."""
     render = finished(half, 1, 1e-9, most)
     assert 0.75 * most <= render.picture.samples.mean() <= most
     assert render.picture.samples.min() >= 1
-    assert render.pilot.samples[0] <= max(LEAST, most / 2)
+    assert render.survey.samples[0] <= max(LEAST, most / 2)
 
 
 def test_a_target_within_the_cap_does_not_feel_it(half):
@@ -373,7 +373,7 @@ def test_a_time_limit_leaves_a_whole_picture(half, monkeypatch, ticks):
     render = finished(half, 1, 1e-6, time_limit=ticks + 0.5)
     counts = render.picture.samples
     assert counts.min() >= 1
-    assert render.pilot.samples.max() <= max(LEAST, counts.mean() / 2)
+    assert render.survey.samples.max() <= max(LEAST, counts.mean() / 2)
     result = make_result(half, 0, round(counts.mean()))
     assert np.isfinite(result.image).all()
     assert result.image[:, :4] == pytest.approx(1.0)
@@ -382,7 +382,7 @@ def test_a_time_limit_leaves_a_whole_picture(half, monkeypatch, ticks):
 @pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize("presses", [1, 4])
 def test_ctrl_c_keeps_what_there_is_of_every_pixel(presses):
-    """At the first report, which is the pilot's, and at a later one."""
+    """At the first report, which is the survey's, and at a later one."""
     left = [presses]
 
     def press(_progress):
@@ -410,7 +410,7 @@ def test_a_black_scene_ends_and_says_why(device, caplog):
 def test_a_scene_without_noise_ends_at_once(device, sampler, caplog):
     render = finished(opened(device, inside(thickness=0.0), sampler), 1, 1e-12)
     assert (render.picture.samples == LEAST).all()
-    assert (render.pilot.samples == LEAST).all()
+    assert (render.survey.samples == LEAST).all()
     assert not [r for r in caplog.records if r.name == "clvol" and r.levelno >= logging.WARNING]
 
 
@@ -451,13 +451,13 @@ def test_pictures_of_a_target_do_not_merge():
 # -- what is told ------------------------------------------------------------------------------------
 
 
-def test_progress_tells_pilot_and_picture_and_never_goes_back(half):
+def test_progress_tells_survey_and_picture_and_never_goes_back(half):
     records = []
     render = finished(half, 4, 0.005, callback=records.append)
     assert [what for what, _ in itertools.groupby(r.what for r in records)][:3] == [
-        "pilot",
+        "survey",
         "rendering",
-        "pilot",
+        "survey",
     ]
     for name in ("samples_done", "seconds"):
         values = [getattr(r, name) for r in records]
@@ -474,12 +474,12 @@ def test_progress_tells_pilot_and_picture_and_never_goes_back(half):
     assert last.noise == pytest.approx(0.005, rel=0.05)
 
 
-def test_the_time_left_counts_the_pilots():
-    """After 100 of 900 samples, all of them the pilot's, in 10 seconds: 80 are left."""
-    record = adaptive.TargetProgress(0, 800, 10.0, pilot=(100, 100))
+def test_the_time_left_counts_the_surveys():
+    """After 100 of 900 samples, all of them the survey's, in 10 seconds: 80 are left."""
+    record = adaptive.TargetProgress(0, 800, 10.0, survey=(100, 100))
     assert record.fraction == pytest.approx(1 / 9)
     assert record.seconds_left == pytest.approx(80)
-    assert adaptive.TargetProgress(0, None, 10.0, 20.0, pilot=(10, 16)).fraction == 0.5
+    assert adaptive.TargetProgress(0, None, 10.0, 20.0, survey=(10, 16)).fraction == 0.5
 
 
 XML = """<scene version="3.0.0">

@@ -65,7 +65,7 @@ def test_a_picture_that_is_black_by_chance_has_an_unknown_noise(caplog):
 
 
 def test_a_target_error_is_not_met_by_seeing_nothing(caplog):
-    """Light that one sample in a hundred or so finds: the first pilot of 16 samples in one pixel does not."""
+    """Light that one sample in a hundred or so finds: a first survey of 16 samples in one pixel does not."""
     lamp = PointEmitter((1.0,), (0.0, 50.0, 0.0))
     scene = picture([box(*CUBE, gridded(0.005, 0.5))], (lamp,), (0.0, 0.3, -4.0), (0, 0, 0), 10.0, (1, 1))
     result = clvol.render(scene, spp=4096, target_error=0.2, seed=3)

@@ -8,7 +8,7 @@ from pictures import box, homogeneous
 from probe import grid_volume, medium_of, scene_of
 from trees import leaves_of
 
-from clvol.accel import choice, controls
+from clvol.accel import controls, costs
 from clvol.accel.bounds import with_slack
 from clvol.accel.kdtree import build_kdtree, pack_maximum, unpack_maximum
 from clvol.errors import SceneError
@@ -127,13 +127,13 @@ def test_auto_takes_what_costs_least_for_the_technique(control):
     chosen, _ = prepared(base, 400.0, control=control)
     bounds, rate = bounds_of(base), 400.0
     edges = BOUND_CELLS / np.array(base.shape[::-1])
-    tree = build_kdtree(bounds, edges, rate, choice.LEAF_COST, choice.STEP_COST, control)
-    costs = {
-        "global": choice.global_cost(bounds, edges, rate, control),
-        "grid": choice.best_grid(bounds, edges, rate, control)[1],
+    tree = build_kdtree(bounds, edges, rate, costs.LEAF_COST, costs.STEP_COST, control)
+    expected = {
+        "global": costs.global_cost(bounds, edges, rate, control),
+        "grid": costs.best_grid(bounds, edges, rate, control)[1],
         "kdtree": tree.cost,
     }
-    assert chosen.kind == min(costs, key=costs.get)
+    assert chosen.kind == min(expected, key=expected.get)
 
 
 def test_scenes_without_grids_have_no_majorant():

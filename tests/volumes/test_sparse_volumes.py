@@ -17,7 +17,7 @@ from trees import leaves_of
 from walks import BINS, collision_p_value, sample_walks, transmittance_walks, unbiased, weighted_z
 
 import clvol
-from clvol.accel import choice
+from clvol.accel import costs
 from clvol.accel.bounds import with_slack
 from clvol.accel.sparse_bounds import from_dense, sparse_bounds
 from clvol.accel.sparse_grid import tree_grid
@@ -141,8 +141,8 @@ def test_a_kdtree_without_arrays_bounds_all_cells_and_costs_what_it_says(monkeyp
     dense, tree = both(GRIDS[name], monkeypatch)
     exact = with_slack(dense.minimum, dense.maximum, BOUND_CELLS, dense.means())
     bounds = finest_lattice(sparse_bounds(tree, True))
-    costs = 2.0, choice.LEAF_COST, choice.STEP_COST
-    built = build_tree(bounds, np.array([1.0, 0.7, 1.3]), *costs, control)
+    priced = 2.0, costs.LEAF_COST, costs.STEP_COST
+    built = build_tree(bounds, np.array([1.0, 0.7, 1.3]), *priced, control)
     total = 0.0
     for index, lower, upper, depth in leaves_of(built.nodes, exact):
         x, y, z = (slice(a, b) for a, b in zip(lower, upper, strict=True))
@@ -153,7 +153,7 @@ def test_a_kdtree_without_arrays_bounds_all_cells_and_costs_what_it_says(monkeyp
             assert built.mean[row] == pytest.approx(exact.mean[z, y, x].mean(dtype=float), rel=1e-4, abs=1e-9)
         high = 0.0 if built.nodes[index, 0] == 3 else built.nodes[index, :1].view(np.float32)[0]
         w, h, d = (upper - lower) * np.array([1.0, 0.7, 1.3])
-        total += 2.0 * w * h * d * high + (costs[1] + depth * costs[2]) * 0.5 * (
+        total += 2.0 * w * h * d * high + (priced[1] + depth * priced[2]) * 0.5 * (
             w * h + h * d + d * w
         ) * bool(inside.size)
     if control == "none":
