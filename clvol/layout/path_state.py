@@ -6,7 +6,7 @@ arrays: all slots' first field, then all slots' second, ...
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -208,6 +208,8 @@ PATH_STATE: tuple[Declared, ...] = (
     ),
 )
 """In the order in which a slot holds them."""
+_COUNTS = [declared for declared in PATH_STATE if declared.name in COUNTS]
+_FIRST_HITS = [declared for name in FIRST_HIT for declared in _first_hit(name)]
 
 SLOT_STATISTICS: dict[str, Callable[..., Any]] = {
     "tentative": np.sum,
@@ -229,8 +231,7 @@ def path_fields(macros: Macros) -> list[PathField]:
 
 def path_counts(macros: Macros) -> tuple[str, ...]:
     """Counts that are kept per path and summed per pixel, for pictures that show them."""
-    kept = {field.name for field in path_fields(macros)}
-    return tuple(name for name in COUNTS if macros[f"CLVOL_SHOWS_{name.upper()}"] and name in kept)
+    return tuple(d.name for d in _COUNTS if macros[f"CLVOL_SHOWS_{d.name.upper()}"] and d.fields(macros))
 
 
 def shows_weight(macros: Macros) -> bool:
@@ -245,8 +246,7 @@ def counts_per_path(macros: Macros) -> int:
 
 def first_hit_fields(macros: Macros) -> list[str]:
     """Fields kept per path for pictures of the first hit, in order."""
-    declared: Sequence[Declared] = [field for name in FIRST_HIT for field in _first_hit(name)]
-    return [field.name for each in declared for field in each.fields(macros)]
+    return [field.name for declared in _FIRST_HITS for field in declared.fields(macros)]
 
 
 def slot_fields(macros: Macros) -> list[str]:
