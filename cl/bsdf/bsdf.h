@@ -32,8 +32,7 @@ INLINE Spectrum null_transmission(const Scene *scene, __global const Material *m
     const float opacity = material_opacity(scene, material, uv);
 #if CLVOL_BSDF_THIN_DIELECTRIC
     if (IS_BSDF(material, THIN_DIELECTRIC))
-        return (Spectrum)(1.0f - opacity) +
-               opacity * thin_dielectric_transmission(scene, material, uv, cos_i, channel);
+        return (Spectrum)(1.0f - opacity) + opacity * thin_dielectric_transmission(scene, material, uv, cos_i, channel);
 #endif
     return (Spectrum)(1.0f - opacity);
 }

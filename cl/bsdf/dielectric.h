@@ -5,8 +5,8 @@
 #include "bsdf/fresnel.h"
 #include "bsdf/sample.h"
 
-INLINE bool dielectric_sample(const Scene *scene, __global const Material *material, float2 uv, float3 wi,
-                              float choice, int channel, BsdfSample *sample)
+INLINE bool dielectric_sample(const Scene *scene, __global const Material *material, float2 uv, float3 wi, float choice,
+                              int channel, BsdfSample *sample)
 {
     const Fresnel fresnel = fresnel_dielectric(wi.z, material->ior);
     if (happens(choice, fresnel.reflectance))

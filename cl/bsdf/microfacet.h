@@ -121,8 +121,8 @@ INLINE float3 beckmann_normal(__global const Material *material, float3 w, float
     const float r2 = w.x * w.x + w.y * w.y, r = sqrt(r2);
     const float cos_phi = r > 0.0f ? w.x / r : 1.0f, sin_phi = r > 0.0f ? w.y / r : 0.0f;
     const float x = beckmann_slope(w.z, r, u), y = erf_inverse(2.0f * v - 1.0f);
-    return (float3)(-material->alpha_u * (cos_phi * x - sin_phi * y),
-                    -material->alpha_v * (sin_phi * x + cos_phi * y), 1.0f);
+    return (float3)(-material->alpha_u * (cos_phi * x - sin_phi * y), -material->alpha_v * (sin_phi * x + cos_phi * y),
+                    1.0f);
 }
 
 /* Reflecting w on a sphere gives a spherical cap of uniform directions (Dupuy and Benyoub 2023). */

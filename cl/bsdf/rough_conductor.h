@@ -6,8 +6,8 @@
 #include "bsdf/microfacet.h"
 #include "bsdf/sample.h"
 
-INLINE bool rough_conductor_sample(const Scene *scene, __global const Material *material, float2 uv, float3 wi,
-                                   float u, float v, int channel, BsdfSample *sample)
+INLINE bool rough_conductor_sample(const Scene *scene, __global const Material *material, float2 uv, float3 wi, float u,
+                                   float v, int channel, BsdfSample *sample)
 {
     if (wi.z <= 0.0f)
         return false;

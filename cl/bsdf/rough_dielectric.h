@@ -42,9 +42,8 @@ INLINE bool rough_dielectric_sample(const Scene *scene, __global const Material 
         return false;
     const float pdf = facet_value(material, wi, wo, m, fresnel, reflects).y;
     const float ratio = shadowing(material, wo) * shadowing_over_cos(material, wi) / visibility_over_cos(material, wi);
-    const Spectrum weight = reflects
-                                ? ratio * specular_reflectance(scene, material, uv, channel)
-                                : ratio * inverse * inverse * specular_transmittance(scene, material, uv, channel);
+    const Spectrum weight = reflects ? ratio * specular_reflectance(scene, material, uv, channel)
+                                     : ratio * inverse * inverse * specular_transmittance(scene, material, uv, channel);
     return scattered_sample(sample, wo, weight, pdf, reflects ? 1.0f : fresnel.eta) && pdf < INFINITY;
 }
 

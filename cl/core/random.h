@@ -39,22 +39,13 @@ INLINE uint4 philox4x32(uint4 counter, uint2 key)
 }
 
 /* Where a block's numbers stand among those of a path. */
-INLINE uint block_number(SampleKey key, uint block)
-{
-    return key.bounce * 8u + block;
-}
+INLINE uint block_number(SampleKey key, uint block) { return key.bounce * 8u + block; }
 
 /* (k + 1/2) / 2^32: never 0; rounds to 1 only within 2^-25 of it, so compare where that is safe. */
-INLINE float uniform_float(uint k)
-{
-    return (float)k * 0x1p-32f + 0x1p-33f;
-}
+INLINE float uniform_float(uint k) { return (float)k * 0x1p-32f + 0x1p-33f; }
 
 /* As uniform_float, but strictly below 1, for positions and table look-ups. */
-INLINE float uniform_below_one(uint k)
-{
-    return min_of(uniform_float(k), 0x1.fffffep-1f);
-}
+INLINE float uniform_below_one(uint k) { return min_of(uniform_float(k), 0x1.fffffep-1f); }
 
 /* Stream of a tracking loop: SplitMix64 read as a counter-based generator (state = seed + n·γ;
    Steele, Lea, Flood 2014). */

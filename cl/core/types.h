@@ -46,10 +46,7 @@ INLINE Spectrum to_spectrum(float3 rgb, int channel)
 #endif
 }
 
-INLINE float3 load_vector(__global const float *v)
-{
-    return (float3)(v[0], v[1], v[2]);
-}
+INLINE float3 load_vector(__global const float *v) { return (float3)(v[0], v[1], v[2]); }
 
 /* A half-line o + t d; d is a unit vector in world space, and whatever an affine map makes of it
    in a medium's index space, so that t is always a world length. */

@@ -49,10 +49,7 @@ INLINE Cubic segment_cubic(const MediumRay *in, float3 start, const LatticeWalk 
     return cubic;
 }
 
-INLINE Extinction cubic_value(const Cubic *f, float w)
-{
-    return f->a + w * (f->b + w * (f->c + w * f->d));
-}
+INLINE Extinction cubic_value(const Cubic *f, float w) { return f->a + w * (f->b + w * (f->c + w * f->d)); }
 
 /* Integral from 0 to w. */
 INLINE Extinction cubic_integral(const Cubic *f, float w)

@@ -54,7 +54,8 @@ INLINE VolumeCell volume_cell(const Scene *scene, __global const Volume *volume,
 /* The corner that lies beyond the given fractions of the cell: (½, ½, ½) takes the nearest sample. */
 INLINE int cell_corner(const VolumeCell *cell, float x, float y, float z)
 {
-    return ((cell->fx >= x ? 1 : 0) + (cell->fy >= y ? BRICK_EDGE : 0) + (cell->fz >= z ? BRICK_LAYER : 0)) * cell->stride;
+    return ((cell->fx >= x ? 1 : 0) + (cell->fy >= y ? BRICK_EDGE : 0) + (cell->fz >= z ? BRICK_LAYER : 0)) *
+           cell->stride;
 }
 
 INLINE float cell_trilinear(const VolumeCell *cell, int channel)

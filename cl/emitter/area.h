@@ -56,8 +56,8 @@ INLINE float3 cone_direction(const SphereCone *cone, float u, float v, float *di
 }
 
 /* Uniform over a mesh: a triangle in proportion to its area, then a point of it. */
-INLINE float3 mesh_point(const Scene *scene, __global const Emitter *emitter, float choice, float u, float v, float3 *ng,
-                         uint *primitive)
+INLINE float3 mesh_point(const Scene *scene, __global const Emitter *emitter, float choice, float u, float v,
+                         float3 *ng, uint *primitive)
 {
     const int entry = cdf_search(scene->light_cdf + emitter->first, emitter->count, choice);
     const float root = sqrt(u);
@@ -74,8 +74,8 @@ INLINE float3 mesh_point(const Scene *scene, __global const Emitter *emitter, fl
 }
 
 /* A point uniform over the light's area, the unit normal of its front there, and the primitive it lies on. */
-INLINE float3 area_point(const Scene *scene, __global const Emitter *emitter, float choice, float u, float v, float3 *ng,
-                         uint *primitive)
+INLINE float3 area_point(const Scene *scene, __global const Emitter *emitter, float choice, float u, float v,
+                         float3 *ng, uint *primitive)
 {
     __global const Shape *shape = scene->shapes + emitter->shape;
     if (CLVOL_HAS_AREA_MESH && shape->kind == SURFACE_MESH)
@@ -101,8 +101,8 @@ INLINE float3 area_point(const Scene *scene, __global const Emitter *emitter, fl
 }
 
 /* Fills in a sample of the light; `choice` is a third uniform number. */
-INLINE void sample_area(const Scene *scene, __global const Emitter *emitter, float3 from, float choice, float u, float v,
-                        LightSample *light)
+INLINE void sample_area(const Scene *scene, __global const Emitter *emitter, float3 from, float choice, float u,
+                        float v, LightSample *light)
 {
     __global const Shape *shape = scene->shapes + emitter->shape;
     SphereCone cone;

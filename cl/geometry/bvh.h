@@ -62,10 +62,7 @@ typedef struct {
 
 /* A component of 0 counts as a tiny one: 0 times infinity never occurs, and since boxes are padded, an origin between a
    pair of planes is between them by more than nothing. */
-INLINE float inverse_of(float d)
-{
-    return abs_of(d) * STEEPEST > 1.0f ? 1.0f / d : with_sign(STEEPEST, d);
-}
+INLINE float inverse_of(float d) { return abs_of(d) * STEEPEST > 1.0f ? 1.0f / d : with_sign(STEEPEST, d); }
 
 INLINE Slabs slabs_of(Ray ray)
 {
@@ -180,15 +177,9 @@ INLINE void test_leaf(const Scene *scene, uint reference, Query *query)
 }
 
 /* A node that waits: its entry's bits above its reference, so that they compare as the entries do. */
-INLINE ulong waiting(float entry, uint reference)
-{
-    return ((ulong)as_uint(entry) << 32) | reference;
-}
+INLINE ulong waiting(float entry, uint reference) { return ((ulong)as_uint(entry) << 32) | reference; }
 
-INLINE float waiting_entry(ulong node)
-{
-    return as_float((uint)(node >> 32));
-}
+INLINE float waiting_entry(ulong node) { return as_float((uint)(node >> 32)); }
 
 /* The nearest of the children met, at least one; the others go on the stack, the nearer the later. */
 INLINE uint nearest_child(ulong *stack, uint *height, uint lanes, float8 entry8, __global const uint *references)

@@ -68,7 +68,8 @@ INLINE void triangle_surface(const Scene *scene, const Hit *hit, __global const 
     surface->uv = (float2)(u, v);
     float3 dp_du = e1;
     if (CLVOL_HAS_VERTEX_UVS && shape->uvs) {
-        const float2 ta = vload2(face[0], scene->uvs), tb = vload2(face[1], scene->uvs), tc = vload2(face[2], scene->uvs);
+        const float2 ta = vload2(face[0], scene->uvs), tb = vload2(face[1], scene->uvs),
+                     tc = vload2(face[2], scene->uvs);
         const float2 d1 = tb - ta, d2 = tc - ta;
         const float determinant = d1.x * d2.y - d1.y * d2.x;
         surface->uv = w * ta + u * tb + v * tc;

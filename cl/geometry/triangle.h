@@ -15,10 +15,7 @@ typedef struct {
     float shear_x, shear_y, scale_z;
 } Shear;
 
-INLINE float component(float3 v, uint axis)
-{
-    return axis == 0u ? v.x : (axis == 1u ? v.y : v.z);
-}
+INLINE float component(float3 v, uint axis) { return axis == 0u ? v.x : (axis == 1u ? v.y : v.z); }
 
 INLINE Shear shear_of(Ray ray)
 {

@@ -16,8 +16,8 @@ INLINE MajorantWalk majorant_begin(const MediumRay *in)
 {
     MajorantWalk walk;
     __global const Medium *medium = in->medium;
-    walk.lattice =
-        lattice_begin(in->index_ray, medium->cells[0], medium->cells[1], medium->cells[2], medium->cell_size, in->t_max);
+    walk.lattice = lattice_begin(in->index_ray, medium->cells[0], medium->cells[1], medium->cells[2], medium->cell_size,
+                                 in->t_max);
     return walk;
 }
 

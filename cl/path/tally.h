@@ -17,9 +17,6 @@ INLINE void record_tally(const Scene *scene, uint slot, Tally tally)
 }
 
 /* What a stage's budget counts (STAGE_STEPS). */
-INLINE uint steps_of(const Tally *tally)
-{
-    return tally->tentative + tally->cells + tally->lookups;
-}
+INLINE uint steps_of(const Tally *tally) { return tally->tentative + tally->cells + tally->lookups; }
 
 #endif

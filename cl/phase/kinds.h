@@ -5,7 +5,6 @@
 #include CLVOL_PHASES_HEADER
 
 /* Without a look where the scene has one kind only. */
-#define IS_PHASE(lobe, name) \
-    (CLVOL_PHASE_##name && (PHASE_KINDS == 1 || (lobe)->kind == PHASE_##name))
+#define IS_PHASE(lobe, name) (CLVOL_PHASE_##name && (PHASE_KINDS == 1 || (lobe)->kind == PHASE_##name))
 
 #endif

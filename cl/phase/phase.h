@@ -44,8 +44,8 @@ INLINE float phase_pdf(const Scene *scene, __global const Medium *medium, float3
 
 /* `choice` in (0, 1) picks the lobe.  The rarest comes first, where small numbers resolve its weight; the last
    takes what is left, so that rounding never picks a lobe of weight 0. */
-INLINE float3 phase_sample(const Scene *scene, __global const Medium *medium, float3 wo, float u, float v,
-                           float choice, float *pdf)
+INLINE float3 phase_sample(const Scene *scene, __global const Medium *medium, float3 wo, float u, float v, float choice,
+                           float *pdf)
 {
     __global const Phase *lobe = scene->phases + medium->phase_first;
     for (int left = CLVOL_HAS_BLEND ? medium->phase_count - 1 : 0; left > 0 && choice >= lobe->weight; --left) {

@@ -41,9 +41,11 @@ INLINE float parameter_of(Ray ray, float3 p) { return dot(p - ray.o, ray.d) / do
 
 #define RECORD_WALKS
 #define RECORD_TENTATIVE(t, rate, tally) record_event(tally, EVENT_TENTATIVE, t, (float3)(rate))
-#define RECORD_LOOKUP(in, p, sigma_t, tally) record_event(tally, EVENT_LOOKUP, parameter_of((in)->index_ray, p), (float3)(sigma_t))
+#define RECORD_LOOKUP(in, p, sigma_t, tally) \
+    record_event(tally, EVENT_LOOKUP, parameter_of((in)->index_ray, p), (float3)(sigma_t))
 #define RECORD_NULL(beta, tally) record_event(tally, EVENT_NULL, 0.0f, (float3)(beta))
 #define RECORD_REAL(t, beta, tally) record_event(tally, EVENT_REAL, t, (float3)(beta))
-#define RECORD_ESTIMATE(t, estimate, tally) record_event(tally, EVENT_ESTIMATE, t, (float3)(estimate) * ((Recorder *)(tally))->share)
+#define RECORD_ESTIMATE(t, estimate, tally) \
+    record_event(tally, EVENT_ESTIMATE, t, (float3)(estimate) * ((Recorder *)(tally))->share)
 
 #endif

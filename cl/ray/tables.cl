@@ -24,8 +24,8 @@ __kernel void tables(CLVOL_ARGUMENTS, __global const float *given, __global floa
 #if CLVOL_HAS_HETEROGENEOUS
             __global const Volume *volume = scene.volumes + in.medium->sigma_t_volume;
             if (!is_homogeneous(in.medium))
-                sigma[c * points + i] =
-                    scale * volume_value(&scene, volume, in.index_ray.o + t * in.index_ray.d, (int)c);
+                sigma[c * points + i] = scale *
+                                        volume_value(&scene, volume, in.index_ray.o + t * in.index_ray.d, (int)c);
             else
 #endif
                 sigma[c * points + i] = scale;

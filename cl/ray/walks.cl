@@ -55,7 +55,11 @@ __kernel void walks(CLVOL_ARGUMENTS, __global const float *given, __global float
     MediumRay in = given_ray(&scene, given);
     const uint4 k = philox4x32((uint4)(i, 0, 0, 0), seed);
     Stream stream = stream_begin(k.z, k.w);
-    Recorder recorder = {{0, 0, 0, 0, 0, 0, 0.0f}, log + i * capacity * EVENT_SIZE, 0, i < recorded ? capacity : 0, 0.0f,
+    Recorder recorder = {{0, 0, 0, 0, 0, 0, 0.0f},
+                         log + i * capacity * EVENT_SIZE,
+                         0,
+                         i < recorded ? capacity : 0,
+                         0.0f,
                          (float3)(1.0f)};
     Tally *tally = &recorder.tally;
     uint first = k.x;

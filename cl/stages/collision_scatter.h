@@ -70,8 +70,8 @@ INLINE bool next_event(const Scene *scene, uint slot, SampleKey key, __global co
     if (!medium->sample_emitters)
         return false;
     const uint4 k = decision_block(scene, key, BLOCK_LIGHT, 0);
-    const LightSample light =
-        sample_light(scene, p, uniform_below_one(k.x), uniform_below_one(k.y), uniform_below_one(k.z));
+    const LightSample light = sample_light(scene, p, uniform_below_one(k.x), uniform_below_one(k.y),
+                                           uniform_below_one(k.z));
     const float pdf = phase_pdf(scene, medium, wo, light.direction);
     const float weight = light.pdf > 0.0f ? mis_weight(light.pdf, pdf) : 1.0f;
     const Spectrum value = beta * to_spectrum(light.value, (int)path_channel(scene, slot)) * (pdf * weight);

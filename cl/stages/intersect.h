@@ -47,7 +47,7 @@ INLINE void intersect(const Scene *scene, uint group, uint slot)
     const Inside inside = path_inside(scene, slot);
     MediumSegment segment = {-1, 0.0f, {0.0f, 0.0f, 0.0f}};
     if (next_medium_segment(scene, ray, &inside, path_after_t(scene, slot), segment_end(scene, slot, ray),
-                  ray_limit(scene, slot, ray), &segment)) {
+                            ray_limit(scene, slot, ray), &segment)) {
         to_medium(scene, group, slot, event);
         return;
     }

@@ -6,10 +6,7 @@
 #include "tracking/interface.h"
 
 /* The random numbers of a leg: those of the walk's block, and for later ones what they key. */
-INLINE uint4 leg_block(uint4 block, uint leg)
-{
-    return leg == 0 ? block : philox4x32(block, (uint2)(leg, 0));
-}
+INLINE uint4 leg_block(uint4 block, uint leg) { return leg == 0 ? block : philox4x32(block, (uint2)(leg, 0)); }
 
 /* Where a walk stands on its ray.  Legs may be shorter than what rounding takes from their sum, so that is kept. */
 typedef struct {

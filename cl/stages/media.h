@@ -47,8 +47,8 @@ INLINE bool next_medium_segment(const Scene *scene, Ray ray, const Inside *insid
         if (!medium_segment(scene, (uint)m, ray, inside, from, to, &span))
             continue;
         const float t0 = span_t(&span);
-        const bool is_later =
-            segment->medium < 0 || t0 > segment->start || (t0 == segment->start && m > segment->medium);
+        const bool is_later = segment->medium < 0 || t0 > segment->start ||
+                              (t0 == segment->start && m > segment->medium);
         if (is_later && t0 < next.start) {
             next.medium = m;
             next.start = t0;
@@ -72,10 +72,7 @@ INLINE MediumRay segment_ray(const Scene *scene, const Inside *inside, int m, Ra
 }
 
 /* Which of the random numbers of a bounce a walk takes. */
-INLINE uint walk_number(const Scene *scene, uint segment, int m)
-{
-    return segment * scene->render->media + (uint)m;
-}
+INLINE uint walk_number(const Scene *scene, uint segment, int m) { return segment * scene->render->media + (uint)m; }
 
 #endif
 #endif

@@ -18,9 +18,8 @@ INLINE uint medium_sample(const Scene *scene, uint group, uint slot)
     const SampleKey key = path_key(scene, slot);
     const Ray ray = path_ray(scene, slot);
     const Walked walked = take_walked(scene, slot, 0.0f);
-    const MediumRay in = rest_of_ray(medium_ray(scene, scene->media, ray, path_medium_end(scene, slot),
-                                                (int)path_channel(scene, slot)),
-                                     walked.t);
+    const MediumRay in = rest_of_ray(
+        medium_ray(scene, scene->media, ray, path_medium_end(scene, slot), (int)path_channel(scene, slot)), walked.t);
     const uint4 k = leg_block(decision_block(scene, key, BLOCK_WALK, 0), walked.leg);
     Tally tally = {0, 0, 0, 0, 0, 0, 0.0f};
     Collision collision;

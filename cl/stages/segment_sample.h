@@ -61,8 +61,8 @@ INLINE uint medium_sample(const Scene *scene, uint group, uint slot)
             Ray start = ray;
             start.o = span_point(&segment.span, ray);
             const float length = min_of(segment.span.end - segment.span.start, reach - segment.start);
-            const MediumRay in =
-                segment_ray(scene, &inside, segment.medium, start, length, (int)path_channel(scene, slot));
+            const MediumRay in = segment_ray(scene, &inside, segment.medium, start, length,
+                                             (int)path_channel(scene, slot));
             const uint number = walk_number(scene, path_segment(scene, slot), segment.medium);
             const uint4 k = leg_block(decision_block(scene, key, BLOCK_WALK, number), walked.leg);
             collision.beta = JOINT_WEIGHTS ? before : beta;

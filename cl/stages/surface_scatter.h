@@ -72,8 +72,8 @@ INLINE bool surface_next_event(const Scene *scene, uint slot, SampleKey key, con
     if (material_is_smooth(side->material))
         return false;
     const uint4 k = decision_block(scene, key, BLOCK_LIGHT, 0);
-    LightSample light =
-        sample_light(scene, surface->p, uniform_below_one(k.x), uniform_below_one(k.y), uniform_below_one(k.z));
+    LightSample light = sample_light(scene, surface->p, uniform_below_one(k.x), uniform_below_one(k.y),
+                                     uniform_below_one(k.z));
     float pdf;
     const int channel = (int)path_channel(scene, slot);
     const Spectrum f = bsdf_value(scene, side->material, surface->uv, on_side(side, wi),
@@ -151,9 +151,9 @@ INLINE bool shade_surface(const Scene *scene, uint slot, bool *shadow_ray)
 #if CLVOL_HAS_REFLECTION
     BsdfSample sample;
     Spectrum beta = path_beta(scene, slot);
-    const bool sampled =
-        bsdf_sample(scene, side.material, surface.uv, on_side(&side, wi), uniform_below_one(k.y),
-                    uniform_below_one(k.z), uniform_float(k.w), (int)path_channel(scene, slot), &sample);
+    const bool sampled = bsdf_sample(scene, side.material, surface.uv, on_side(&side, wi), uniform_below_one(k.y),
+                                     uniform_below_one(k.z), uniform_float(k.w), (int)path_channel(scene, slot),
+                                     &sample);
 #if CLVOL_HAS_PASSABLE
     if (sampled && sample.passes) {
         set_path_beta(scene, slot, beta * sample.weight);

@@ -16,10 +16,7 @@ INLINE Extinction exp_of_minus(Extinction depth)
 }
 
 #if CLVOL_EXTINCTION == 3
-INLINE float channel_of(float3 v, int channel)
-{
-    return channel == 0 ? v.x : (channel == 1 ? v.y : v.z);
-}
+INLINE float channel_of(float3 v, int channel) { return channel == 0 ? v.x : (channel == 1 ? v.y : v.z); }
 
 /* A channel in proportion to |beta|; one of weight 0 is never picked. */
 INLINE int pick_channel(float3 beta, uint2 k)

@@ -5,10 +5,7 @@
 #include "tracking/channels.h"
 #include "tracking/interface.h"
 
-INLINE Extinction homogeneous_transmittance(const MediumRay *in)
-{
-    return exp_of_minus(in->scale * in->t_max);
-}
+INLINE Extinction homogeneous_transmittance(const MediumRay *in) { return exp_of_minus(in->scale * in->t_max); }
 
 #endif
 #endif

@@ -21,21 +21,12 @@
 /* Tentative collisions before the point, of which most segments have none, beyond which an estimate is given up. */
 #define THIN_BUDGET 64u
 
-INLINE float global_rate(const MediumRay *in)
-{
-    return in->rate * in->medium->bound;
-}
+INLINE float global_rate(const MediumRay *in) { return in->rate * in->medium->bound; }
 
-INLINE bool is_thin(const MediumRay *in)
-{
-    return global_rate(in) * in->t_max <= THIN_DEPTH;
-}
+INLINE bool is_thin(const MediumRay *in) { return global_rate(in) * in->t_max <= THIN_DEPTH; }
 
 /* `first` places the point, */
-INLINE float thin_point(const MediumRay *in, uint first)
-{
-    return uniform_float(first) * in->t_max;
-}
+INLINE float thin_point(const MediumRay *in, uint first) { return uniform_float(first) * in->t_max; }
 
 /* and gathers its emission.  It also decides the flight: sums keep their mean whatever they share. */
 INLINE Spectrum thin_emission(const MediumRay *in, uint first, Stream *stream, Tally *tally, Spectrum beta)

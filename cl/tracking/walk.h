@@ -60,10 +60,7 @@ INLINE Extinction segment_extinction(const MediumRay *in, const Segment *at, Str
     return extinction_at(in, at->start + at->t * in->index_ray.d, stream, tally);
 }
 
-INLINE float segment_t(const Segment *at)
-{
-    return at->begin + at->t;
-}
+INLINE float segment_t(const Segment *at) { return at->begin + at->t; }
 
 /* A row of a table of coefficients per cell, `extra` numbers after its channels. */
 INLINE __global const float *cell_row(const MediumRay *in, __global const float *table, int cell, int extra)
