@@ -65,10 +65,10 @@ INLINE Spectrum bsdf_value(const Scene *scene, __global const Material *material
     return (Spectrum)(0.0f);
 }
 
-/* Draws wo from three numbers: u, v for the direction and `choice` for the lobe.  False: absorbed, and the sample
+/* Draws wo from three numbers: u, v for the direction and `pick` for the lobe.  False: absorbed, and the sample
    holds nothing. */
 INLINE bool bsdf_sample(const Scene *scene, __global const Material *material, float2 uv, float3 wi, float u, float v,
-                        float choice, int channel, BsdfSample *sample)
+                        float pick, int channel, BsdfSample *sample)
 {
 #if CLVOL_BSDF_DIFFUSE
     if (IS_BSDF(material, DIFFUSE))
@@ -76,15 +76,15 @@ INLINE bool bsdf_sample(const Scene *scene, __global const Material *material, f
 #endif
 #if CLVOL_BSDF_DIELECTRIC
     if (IS_BSDF(material, DIELECTRIC))
-        return dielectric_sample(scene, material, uv, wi, choice, channel, sample);
+        return dielectric_sample(scene, material, uv, wi, pick, channel, sample);
 #endif
 #if CLVOL_BSDF_THIN_DIELECTRIC
     if (IS_BSDF(material, THIN_DIELECTRIC))
-        return thin_dielectric_sample(scene, material, uv, wi, choice, channel, sample);
+        return thin_dielectric_sample(scene, material, uv, wi, pick, channel, sample);
 #endif
 #if CLVOL_BSDF_ROUGH_DIELECTRIC
     if (IS_BSDF(material, ROUGH_DIELECTRIC))
-        return rough_dielectric_sample(scene, material, uv, wi, u, v, choice, channel, sample);
+        return rough_dielectric_sample(scene, material, uv, wi, u, v, pick, channel, sample);
 #endif
 #if CLVOL_BSDF_CONDUCTOR
     if (IS_BSDF(material, CONDUCTOR))
@@ -96,11 +96,11 @@ INLINE bool bsdf_sample(const Scene *scene, __global const Material *material, f
 #endif
 #if CLVOL_BSDF_PLASTIC
     if (IS_BSDF(material, PLASTIC))
-        return plastic_sample(scene, material, uv, wi, u, v, choice, channel, sample);
+        return plastic_sample(scene, material, uv, wi, u, v, pick, channel, sample);
 #endif
 #if CLVOL_BSDF_ROUGH_PLASTIC
     if (IS_BSDF(material, ROUGH_PLASTIC))
-        return rough_plastic_sample(scene, material, uv, wi, u, v, choice, channel, sample);
+        return rough_plastic_sample(scene, material, uv, wi, u, v, pick, channel, sample);
 #endif
     delta_sample(sample, -wi, (Spectrum)(1.0f), 1.0f); /* null */
     sample->passes = true;

@@ -5,11 +5,11 @@
 #include "bsdf/fresnel.h"
 #include "bsdf/sample.h"
 
-INLINE bool dielectric_sample(const Scene *scene, __global const Material *material, float2 uv, float3 wi, float choice,
+INLINE bool dielectric_sample(const Scene *scene, __global const Material *material, float2 uv, float3 wi, float pick,
                               int channel, BsdfSample *sample)
 {
     const Fresnel fresnel = fresnel_dielectric(wi.z, material->ior);
-    if (happens(choice, fresnel.reflectance))
+    if (happens(pick, fresnel.reflectance))
         return delta_sample(sample, mirrored(wi), specular_reflectance(scene, material, uv, channel), 1.0f);
     const float inverse = 1.0f / fresnel.eta;
     const float3 wo = (float3)(-inverse * wi.x, -inverse * wi.y, fresnel.cos_t);
@@ -25,9 +25,9 @@ INLINE Spectrum thin_dielectric_transmission(const Scene *scene, __global const 
 }
 
 INLINE bool thin_dielectric_sample(const Scene *scene, __global const Material *material, float2 uv, float3 wi,
-                                   float choice, int channel, BsdfSample *sample)
+                                   float pick, int channel, BsdfSample *sample)
 {
-    if (happens(choice, thin_reflectance(wi.z, material->ior)))
+    if (happens(pick, thin_reflectance(wi.z, material->ior)))
         return delta_sample(sample, mirrored(wi), specular_reflectance(scene, material, uv, channel), 1.0f);
     delta_sample(sample, -wi, specular_transmittance(scene, material, uv, channel), 1.0f);
     sample->passes = true;

@@ -36,13 +36,13 @@ INLINE Spectrum plastic_value(const Scene *scene, __global const Material *mater
 }
 
 INLINE bool plastic_sample(const Scene *scene, __global const Material *material, float2 uv, float3 wi, float u,
-                           float v, float choice, int channel, BsdfSample *sample)
+                           float v, float pick, int channel, BsdfSample *sample)
 {
     if (wi.z <= 0.0f)
         return false;
     const float coat = fresnel_dielectric(wi.z, material->ior).reflectance;
     const float probability = coat_probability(material, coat);
-    if (happens(choice, probability))
+    if (happens(pick, probability))
         return delta_sample(sample, mirrored(wi),
                             coat / probability * specular_reflectance(scene, material, uv, channel), 1.0f);
     float pdf;

@@ -26,7 +26,7 @@ INLINE float2 facet_value(__global const Material *material, float3 wi, float3 w
 }
 
 INLINE bool rough_dielectric_sample(const Scene *scene, __global const Material *material, float2 uv, float3 wi,
-                                    float u, float v, float choice, int channel, BsdfSample *sample)
+                                    float u, float v, float pick, int channel, BsdfSample *sample)
 {
     if (wi.z == 0.0f)
         return false;
@@ -35,7 +35,7 @@ INLINE bool rough_dielectric_sample(const Scene *scene, __global const Material 
     const float3 m = sample_visible_normal(material, wi.z > 0.0f ? wi : -wi, u, v);
     const float cos_m = dot(wi, m);
     const Fresnel fresnel = fresnel_dielectric(cos_m, material->ior);
-    const bool reflects = happens(choice, fresnel.reflectance);
+    const bool reflects = happens(pick, fresnel.reflectance);
     const float inverse = 1.0f / fresnel.eta;
     const float3 wo = reflects ? 2.0f * cos_m * m - wi : (cos_m * inverse + fresnel.cos_t) * m - inverse * wi;
     if ((wo.z * wi.z > 0.0f) != reflects || wo.z == 0.0f)

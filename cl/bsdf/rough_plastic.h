@@ -36,12 +36,12 @@ INLINE Spectrum rough_plastic_value(const Scene *scene, __global const Material 
 }
 
 INLINE bool rough_plastic_sample(const Scene *scene, __global const Material *material, float2 uv, float3 wi, float u,
-                                 float v, float choice, int channel, BsdfSample *sample)
+                                 float v, float pick, int channel, BsdfSample *sample)
 {
     if (wi.z <= 0.0f)
         return false;
     float3 wo = cosine_direction(u, v);
-    if (happens(choice, coat_probability(material, 1.0f - coat_transmittance(scene, material, wi.z)))) {
+    if (happens(pick, coat_probability(material, 1.0f - coat_transmittance(scene, material, wi.z)))) {
         const float3 m = sample_visible_normal(material, wi, u, v);
         wo = 2.0f * dot(wi, m) * m - wi;
     }

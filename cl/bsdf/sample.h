@@ -17,8 +17,8 @@ typedef struct {
     bool passes;      /* straight on, which is no scattering */
 } BsdfSample;
 
-/* Whether an event of this probability happens; exact for 0 and 1, though `choice` may round to 1. */
-INLINE bool happens(float choice, float probability) { return probability >= 1.0f || choice < probability; }
+/* Whether an event of this probability happens; exact for 0 and 1, though `pick` may round to 1. */
+INLINE bool happens(float pick, float probability) { return probability >= 1.0f || pick < probability; }
 
 INLINE float3 mirrored(float3 wi) { return (float3)(-wi.x, -wi.y, wi.z); }
 

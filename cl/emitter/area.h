@@ -56,10 +56,10 @@ INLINE float3 cone_direction(const SphereCone *cone, float u, float v, float *di
 }
 
 /* Uniform over a mesh: a triangle in proportion to its area, then a point of it. */
-INLINE float3 mesh_point(const Scene *scene, __global const Emitter *emitter, float choice, float u, float v,
-                         float3 *ng, uint *primitive)
+INLINE float3 mesh_point(const Scene *scene, __global const Emitter *emitter, float pick, float u, float v, float3 *ng,
+                         uint *primitive)
 {
-    const int entry = cdf_search(scene->light_cdf + emitter->first, emitter->count, choice);
+    const int entry = cdf_search(scene->light_cdf + emitter->first, emitter->count, pick);
     const float root = sqrt(u);
     Hit hit;
     hit.t = 0.0f;
@@ -74,12 +74,12 @@ INLINE float3 mesh_point(const Scene *scene, __global const Emitter *emitter, fl
 }
 
 /* A point uniform over the light's area, the unit normal of its front there, and the primitive it lies on. */
-INLINE float3 area_point(const Scene *scene, __global const Emitter *emitter, float choice, float u, float v,
-                         float3 *ng, uint *primitive)
+INLINE float3 area_point(const Scene *scene, __global const Emitter *emitter, float pick, float u, float v, float3 *ng,
+                         uint *primitive)
 {
     __global const Shape *shape = scene->shapes + emitter->shape;
     if (CLVOL_HAS_AREA_MESH && shape->kind == SURFACE_MESH)
-        return mesh_point(scene, emitter, choice, u, v, ng, primitive);
+        return mesh_point(scene, emitter, pick, u, v, ng, primitive);
     *primitive = emitter->primitive;
     __global const float *world = shape->world_from_local, *inverse = shape->local_from_world;
     const float2 turn = cos_sin_turn(v);
@@ -100,9 +100,9 @@ INLINE float3 area_point(const Scene *scene, __global const Emitter *emitter, fl
     return transform_point(world, p);
 }
 
-/* Fills in a sample of the light; `choice` is a third uniform number. */
-INLINE void sample_area(const Scene *scene, __global const Emitter *emitter, float3 from, float choice, float u,
-                        float v, LightSample *light)
+/* Fills in a sample of the light; `pick` is a third uniform number. */
+INLINE void sample_area(const Scene *scene, __global const Emitter *emitter, float3 from, float pick, float u, float v,
+                        LightSample *light)
 {
     __global const Shape *shape = scene->shapes + emitter->shape;
     SphereCone cone;
@@ -114,7 +114,7 @@ INLINE void sample_area(const Scene *scene, __global const Emitter *emitter, flo
         return;
     }
     float3 ng;
-    const float3 to = area_point(scene, emitter, choice, u, v, &ng, &light->primitive) - from;
+    const float3 to = area_point(scene, emitter, pick, u, v, &ng, &light->primitive) - from;
     const float square = dot(to, to);
     light->distance = sqrt(square);
     light->direction = to / max_of(light->distance, 1e-30f);

@@ -25,37 +25,37 @@ INLINE float3 environment(const Scene *scene, float3 direction, float *pdf)
 #endif
 
 #if CLVOL_NEE
-/* The light that the uniform number `choice` picks, and in `choice` what is left of it, uniform again.  Emitters
+/* The light that the uniform number `pick` chooses, and in `pick` what is left of it, uniform again.  Emitters
    after the first hold the lower part of the unit interval, the weakest lowest, where floats are finest; the first
    has what is above them. */
-INLINE __global const Emitter *choose_emitter(const Scene *scene, float *choice)
+INLINE __global const Emitter *choose_emitter(const Scene *scene, float *pick)
 {
     const uint count = scene->render->emitters;
     uint lower = 1, upper = count;
     while (lower < upper) {
         const uint middle = (lower + upper) >> 1;
-        if (scene->emitters[middle].cdf > *choice)
+        if (scene->emitters[middle].cdf > *pick)
             upper = middle;
         else
             lower = middle + 1;
     }
     __global const Emitter *emitter = scene->emitters + (lower < count ? lower : 0);
-    const float left = (*choice - (emitter->cdf - emitter->select_pdf)) / emitter->select_pdf;
-    *choice = clamp_to(left, 0.0f, 0x1.fffffep-1f);
+    const float left = (*pick - (emitter->cdf - emitter->select_pdf)) / emitter->select_pdf;
+    *pick = clamp_to(left, 0.0f, 0x1.fffffep-1f);
     return emitter;
 }
 
-/* One direction towards one light; `choice`, u and v are uniform in [0, 1). */
-INLINE LightSample sample_light(const Scene *scene, float3 from, float choice, float u, float v)
+/* One direction towards one light; `pick`, u and v are uniform in [0, 1). */
+INLINE LightSample sample_light(const Scene *scene, float3 from, float pick, float u, float v)
 {
-    __global const Emitter *emitter = choose_emitter(scene, &choice);
+    __global const Emitter *emitter = choose_emitter(scene, &pick);
     LightSample light;
     light.distance = INFINITY;
     light.pdf = 0.0f;
     light.primitive = NO_PRIMITIVE;
 #if CLVOL_HAS_AREA
     if (emitter->kind == EMITTER_AREA) {
-        sample_area(scene, emitter, from, choice, u, v, &light);
+        sample_area(scene, emitter, from, pick, u, v, &light);
         return light;
     }
 #endif

@@ -42,14 +42,14 @@ INLINE float phase_pdf(const Scene *scene, __global const Medium *medium, float3
     return pdf;
 }
 
-/* `choice` in (0, 1) picks the lobe.  The rarest comes first, where small numbers resolve its weight; the last
+/* `pick` in (0, 1) picks the lobe.  The rarest comes first, where small numbers resolve its weight; the last
    takes what is left, so that rounding never picks a lobe of weight 0. */
-INLINE float3 phase_sample(const Scene *scene, __global const Medium *medium, float3 wo, float u, float v, float choice,
+INLINE float3 phase_sample(const Scene *scene, __global const Medium *medium, float3 wo, float u, float v, float pick,
                            float *pdf)
 {
     __global const Phase *lobe = scene->phases + medium->phase_first;
-    for (int left = CLVOL_HAS_BLEND ? medium->phase_count - 1 : 0; left > 0 && choice >= lobe->weight; --left) {
-        choice -= lobe->weight;
+    for (int left = CLVOL_HAS_BLEND ? medium->phase_count - 1 : 0; left > 0 && pick >= lobe->weight; --left) {
+        pick -= lobe->weight;
         ++lobe;
     }
     const float3 wi = lobe_sample(lobe, wo, u, v, pdf);

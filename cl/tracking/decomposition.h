@@ -15,8 +15,8 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
         const float control = cell_extinction(in, cell_row(in, in->scene->controls, flight.walk.cell, 0));
         const float residual = majorant - control;
         const float t = segment_t(&flight.segment);
-        const uint2 choice = stream_pair(stream);
-        if (choose_event(choice.x, control, residual)) {
+        const uint2 k = stream_pair(stream);
+        if (choose_event(k.x, control, residual)) {
             collect_emission(in, t, collision->beta, collision); /* sigma_c / (sigma_maj P_c) = 1 */
             return real_collision(t, tally, collision);
         }
@@ -24,7 +24,7 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
         tally->violations += sigma_t > majorant || sigma_t < control ? 1 : 0;
         const float sigma_r = sigma_t - control;
         collect_emission(in, t, collision->beta * (sigma_r / residual), collision);
-        if (choose_event(choice.y, sigma_r, majorant - sigma_t))
+        if (choose_event(k.y, sigma_r, majorant - sigma_t))
             return real_collision(t, tally, collision);
         flight.depth = exponential_variate(stream_pair(stream).x);
     }

@@ -16,11 +16,11 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
         const float majorant = flight.walk.majorant;
         const Extinction control = cell_extinction(in, cell_row(in, in->scene->controls, flight.walk.cell, 0));
         const float t = segment_t(&flight.segment);
-        const uint2 choice = stream_pair(stream);
+        const uint2 k = stream_pair(stream);
         const float part = event_rate(beta, control), rest = event_rate(beta, majorant - control);
         if (!(part + rest > 0.0f))
             break; /* no weight is left in any channel */
-        if (choose_event(choice.x, part, rest)) {
+        if (choose_event(k.x, part, rest)) {
             collision->beta = beta * (control / majorant) * ((part + rest) / part);
             collect_emission(in, t, collision->beta, collision);
             return real_collision(t, tally, collision);
@@ -35,7 +35,7 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
             collision->beta = (Spectrum)(0.0f);
             return false;
         }
-        if (choose_event(choice.y, real, null)) {
+        if (choose_event(k.y, real, null)) {
             collision->beta = beta * (sigma_r / majorant) * ((real + null) / real);
             return real_collision(t, tally, collision);
         }

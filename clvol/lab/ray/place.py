@@ -28,10 +28,10 @@ SHOWN_RADII = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """The part of a ray inside one medium.
+    """The segment of a ray inside one medium.
 
     origin, direction : float64 (3,), the medium's entry relative to the scene's centre; unit vector.
-    distance : of the entry from the camera.  length : of the part.
+    distance : of the entry from the camera.  length : of the segment.
     medium : number of its entry among the scene's boundaries.  presence : how often it is present there.
     notes : what a viewer has to know, a sentence each.
     """
@@ -55,7 +55,7 @@ def check_pixel(prepared: PreparedScene, x: int, y: int) -> None:
         )
 
 
-class _Part(NamedTuple):
+class _Segment(NamedTuple):
     """One medium between two distances, how often it is present there, and notes."""
 
     medium: int
@@ -84,14 +84,14 @@ def find_places(kernels: RayKernels, x: int, y: int) -> list[Place]:
     to_origin = float(np.linalg.norm(origin - rays.eye))
     hits, spans = kernels.places(origin, direction, MOST_SURFACES)
     places = []
-    for part in _parts(prepared, hits, spans, far):
-        end, notes = part.end, part.notes
+    for segment in _segments(prepared, hits, spans, far):
+        end, notes = segment.end, segment.notes
         if np.isinf(end):
-            end = part.start + SHOWN_RADII * prepared.radius
+            end = segment.start + SHOWN_RADII * prepared.radius
             notes = (*notes, "The medium has no end; only its beginning is shown.")
-        entry = origin + part.start * direction
-        length, distance = end - part.start, to_origin + part.start
-        places.append(Place(entry, direction, distance, length, part.medium, part.presence, notes))
+        entry = origin + segment.start * direction
+        length, distance = end - segment.start, to_origin + segment.start
+        places.append(Place(entry, direction, distance, length, segment.medium, segment.presence, notes))
     if not places:
         raise OptionError(
             f"the ray through pixel ({x}, {y}) meets no medium before a surface stops it"
@@ -108,8 +108,8 @@ def _camera_rays(prepared: PreparedScene) -> CameraRays:
     return camera_rays(scene.sensor, scene.film, prepared.centre, np.inf if everywhere else prepared.radius)
 
 
-def _parts(prepared: PreparedScene, hits: np.ndarray, spans: np.ndarray, far: float) -> Iterator[_Part]:
-    """The parts of the ray in media, in the order of entry.
+def _segments(prepared: PreparedScene, hits: np.ndarray, spans: np.ndarray, far: float) -> Iterator[_Segment]:
+    """The segments of the ray in media, in the order of entry.
 
     hits : float (n, 3), t, surface and whether it is entered.  spans : float (media, 2).
     """
@@ -126,7 +126,7 @@ def _parts(prepared: PreparedScene, hits: np.ndarray, spans: np.ndarray, far: fl
         for first, medium, last in found:
             others = sum(t0 < last and first < t1 for t0, _, t1 in found) - 1
             overlap = [f"{others} more media overlap this one, and are not shown."] if others else []
-            yield _Part(medium, int(presence[medium]), first, last, (*notes, *overlap))
+            yield _Segment(medium, int(presence[medium]), first, last, (*notes, *overlap))
         if number == len(hits) or prepared.surfaces is None:
             return
         surface = int(hits[number, 1])
