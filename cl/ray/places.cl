@@ -1,5 +1,6 @@
 /* What a ray passes: the surfaces in order (t, number, whether it enters), and the span of each medium.
    One work-item; reads origin (3) and direction (3). */
+#include "core/scene.h"
 #include "geometry/bvh.h"
 #include "geometry/span.h"
 #include "geometry/surface.h"
