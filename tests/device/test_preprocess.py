@@ -114,6 +114,14 @@ def test_every_header_includes_what_it_uses(device, folder):
             programs.build(device, unit, name)
 
 
+@pytest.mark.parametrize("name", ["kernels/accumulate.cl", "ray/places.cl", "ray/tables.cl", "ray/walks.cl"])
+def test_every_kernel_includes_what_it_uses_with_and_without_surfaces(device, name):
+    features = Features(media=1, homogeneous=True, emitters=1, constant=True, phases=("HG",), scattering=True)
+    for plan in everything(), Plan.for_features(features, Choices()).settle(Settled("none")):
+        macros = {macro: 0 for macro in re.findall(r"CLVOL_RAY_\w+", TEXTS[name])}
+        programs.build(device, programs.compose(plan, f'#include "{name}"\n', macros), name)
+
+
 def test_every_file_is_included_by_another_or_fills_a_slot():
     included = {name for text in TEXTS.values() for name in re.findall(r'#include "(.+)"', text)}
     chosen = {choice.header for family in registry.FAMILIES.values() for choice in family.values()}
