@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -19,6 +20,33 @@ _NOTHING = re.compile(
     r"(?:\s++|/\*.*?\*/|#line[^\n]*+|#ifndef (\w+_H)\n#define \1\n|#endif[^\n]*+)*+", re.DOTALL
 )
 """What is left of a file that holds nothing."""
+
+
+class _Piece(NamedTuple):
+    """A directive, or lines up to the next one.
+
+    number : of its first line in the file.  word, operand : of a directive, else "".
+    """
+
+    number: int
+    lines: list[str]
+    word: str
+    operand: str
+
+
+@cache
+def _pieces(text: str) -> list[_Piece]:
+    """A file in its pieces; every stage of every plan expands the same files."""
+    pieces: list[_Piece] = []
+    for number, line in enumerate(text.splitlines(), 1):
+        match = _DIRECTIVE.match(line) if "#" in line else None
+        if match:
+            pieces.append(_Piece(number, [line], match[1], match[2]))
+        elif pieces and not pieces[-1].word:
+            pieces[-1].lines.append(line)
+        else:
+            pieces.append(_Piece(number, [line], "", ""))
+    return pieces
 
 
 @dataclass
@@ -42,11 +70,11 @@ class _Lines:
     kept: list[str] = field(default_factory=list)
     expected: int = 0
 
-    def keep(self, number: int, line: str) -> None:
+    def keep(self, number: int, lines: list[str]) -> None:
         if number != self.expected:
             self.kept.append(f'#line {number} "{self.name}"')
-        self.kept.append(line)
-        self.expected = number + 1
+        self.kept += lines
+        self.expected = number + len(lines)
 
     def insert(self, lines: list[str]) -> None:
         if lines:
@@ -83,15 +111,15 @@ class Preprocessor:
         lines = _Lines(name)
         conditionals: list[_Conditional] = []
         active = True
-        for number, line in enumerate(text.splitlines(), 1):
-            match = _DIRECTIVE.match(line) if "#" in line else None
-            if match and match[1] == "include":
+        for number, piece, word, operand in _pieces(text):
+            if word == "include":
                 if active:
-                    lines.insert(self.file(self._target(match[2])))
+                    lines.insert(self.file(self._target(operand)))
                 continue
-            kept: str | None = line
-            if match:
-                kept = self._branch(match[1], match[2], line, conditionals)
+            kept: list[str] | None = piece
+            if word:
+                left = self._branch(word, operand, piece[0], conditionals)
+                kept = None if left is None else [left]
                 active = all(c.active for c in conditionals)
             if active and kept is not None:
                 lines.keep(number, kept)

@@ -33,6 +33,7 @@ SHARED = {
     "CLVOL_PHASES_HEADER": "layout, kinds of phase function",
 }
 """Slots of generated text, and what messages call it."""
+_MACRO = re.compile(r"CLVOL_\w+")
 BUILD_OPTIONS = ("-cl-std=CL1.2", "-w")
 """No relaxed-math flag: they may delete the checks for NaN and infinity (METHODS §7).  -w: compilers
 warn wherever a feature's macro makes a condition constant, which is how the kernels are composed."""
@@ -66,7 +67,7 @@ def expand(
     slots = {**slots, **SHARED, "CLVOL_LAYOUT_HEADER": LAYOUT, "CLVOL_CONTRACT_HEADER": CONTRACT}
     expanded = Preprocessor(read, macros, slots).expand(text, "unit")
     body = "\n".join(expanded) + "\n"
-    used = set(re.findall(r"\bCLVOL_\w+", body))
+    used = set(_MACRO.findall(body))
     defines = [f"#define {name} {value}\n" for name, value in macros.items() if name in used]
     return "/* Composed by clvol. */\n" + "".join(defines) + body
 
