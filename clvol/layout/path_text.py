@@ -13,7 +13,6 @@ from clvol.layout.path_state import (
     FIRST_HIT,
     PATH_STATE,
     Declared,
-    first_hit_fields,
     path_counts,
     path_fields,
     shows_weight,
@@ -21,6 +20,8 @@ from clvol.layout.path_state import (
 from clvol.layout.shared_text import C_TYPES
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from clvol.layout.path_state import Macros
     from clvol.layout.stages import Stage
 
@@ -92,16 +93,19 @@ def path_values(macros: Macros) -> dict[str, Value]:
 def path_text(macros: Macros, stage: Stage | None) -> list[str]:
     """The functions of the values that a stage's contract names; of all values where there is no stage."""
     lines = [f"typedef struct {{ uint word[{max(macros['CLVOL_BOUNDARY_WORDS'], 1)}]; }} Inside;"]
-    for name, value in path_values(macros).items():
+    values = path_values(macros)
+    for name, value in values.items():
         reads = stage is None or name in stage.reads
         writes = stage is None or name in stage.writes
         lines += [f"/* {value.declared.meaning} */"] if reads or writes else []
         lines += [value.reader()] if reads else []
         lines += [value.writer()] if writes else []
-    return lines + _counts_text(macros, stage) + _first_hit_text(macros, stage)
+    if stage is None or "job" in stage.writes:  # paths begin and end there
+        lines += [*_counts_text(macros), _first_hit_text(values)]
+    return lines
 
 
-def _counts_text(macros: Macros, stage: Stage | None) -> list[str]:
+def _counts_text(macros: Macros) -> list[str]:
     """How a path's counts are begun and written; its largest weight, if it is kept, comes last."""
     counts, weight = path_counts(macros), shows_weight(macros)
     reset = [f"set_path_{name}(scene, slot, 0);" for name in counts]
@@ -111,30 +115,21 @@ def _counts_text(macros: Macros, stage: Stage | None) -> list[str]:
         write.append(f"counts[{len(counts)}] = as_uint(path_largest_weight(scene, slot));")
     if write:
         write.insert(0, f"__global uint *counts = scene->result_counts + place * {len(write)}u;")
-    kept = {*counts, *(("largest_weight",) if weight else ())}
-    lines = []
-    if stage is None or kept <= stage.writes:
-        lines.append(f"INLINE void reset_counts({SLOT}) {{ {' '.join(reset)} }}")
-    if stage is None or kept <= stage.reads:
-        lines.append(f"INLINE void write_counts({SLOT}, size_t place) {{ {' '.join(write)} }}")
-    return lines
+    return [
+        f"INLINE void reset_counts({SLOT}) {{ {' '.join(reset)} }}",
+        f"INLINE void write_counts({SLOT}, size_t place) {{ {' '.join(write)} }}",
+    ]
 
 
-def _first_hit_text(macros: Macros, stage: Stage | None) -> list[str]:
+def _first_hit_text(values: Mapping[str, Value]) -> str:
     """How what a path first met is written."""
-    fields = first_hit_fields(macros)
-    values = path_values(macros)
-    kept = [values[name] for name in (*FIRST_HIT, "met") if values[name].rows]
-    if stage is not None and not {value.declared.name for value in kept} <= stage.reads:
-        return []
     write, n = [], 0
-    if fields:
-        write.append(f"__global float *firsts = scene->result_firsts + place * {len(fields)}u;")
-    for value in kept:
-        name = value.declared.name
-        if value.c_type == "float3":
+    for name in (*FIRST_HIT, "met"):
+        if values[name].c_type == "float3" and values[name].rows:
             write.append(f"vstore3(path_{name}(scene, slot), 0, firsts + {n});")
-        else:
+        elif values[name].rows:
             write.append(f"firsts[{n}] = path_{name}(scene, slot);")
-        n += len(value.rows)
-    return [f"INLINE void write_first_hit({SLOT}, size_t place) {{ {' '.join(write)} }}"]
+        n += len(values[name].rows)
+    if write:
+        write.insert(0, f"__global float *firsts = scene->result_firsts + place * {n}u;")
+    return f"INLINE void write_first_hit({SLOT}, size_t place) {{ {' '.join(write)} }}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from functools import cache
 from typing import TYPE_CHECKING
 
 from clvol.layout.path_text import path_values
@@ -61,6 +62,7 @@ def contract_lines(stage: Stage) -> list[str]:
     return [*lines, f"Writes: {', '.join(sets)}"]
 
 
+@cache
 def contract_comment(stage: Stage) -> str:
     """The contract as the head of the stage's unit."""
     lines = [
