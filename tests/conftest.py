@@ -64,8 +64,8 @@ def bounds(monkeypatch):
     compose = programs.compose
 
     def set_to(**counts):
-        def with_bounds(*arguments):
-            text = compose(*arguments)
+        def with_bounds(*arguments, **stage):
+            text = compose(*arguments, **stage)
             for name, count in counts.items():
                 text = re.sub(rf"#define {name} \(.*\)", f"#define {name} {count}u", text)
             return text

@@ -176,7 +176,7 @@ def functions(source):
         while depth:
             depth += {"{": 1, "}": -1}.get(text[end], 0)
             end += 1
-        found[match[1]] = found.get(match[1], "") + text[match.end() : end]
+        found[match[1]] = text[match.end() : end]
     return found
 
 
