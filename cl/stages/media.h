@@ -1,8 +1,8 @@
 /* Which media a ray is in, and where.
 
    A medium is bounded by a shape, which cuts a span out of the ray, or by boundaries, of which a path carries one bit
-   each.  It is present as often as boundaries hold it, less those that keep it out (METHODS §6); as often as that its
-   coefficients count. */
+   each.  Its presence is the number of boundaries that hold it minus the number of those that keep it out; its
+   coefficients are multiplied by it (METHODS §6). */
 #ifndef CLVOL_STAGES_MEDIA_H
 #define CLVOL_STAGES_MEDIA_H
 #if CLVOL_HAS_MEDIA

@@ -212,7 +212,7 @@ def compare_efficiency(ours: Work, theirs: Work, level: float = 0.95) -> Ratio:
     interval is Student's, with fewer degrees of freedom where the rounds have heavy tails (Satterthwaite,
     with the kurtosis of the leave-one-out values).  It covers in 95 % of comparisons where the errors of both
     combinations' rounds spread like a lognormal of sigma 1, and in 91 % where those of one of them alone have
-    a Pareto tail of exponent 2.5 (tests/test_efficiency.py).  The reference's error, common to
+    a Pareto tail of exponent 2.5 (tests/lab/test_efficiency.py).  The reference's error, common to
     both, is added.
 
     Ratio, ends and p are nan where an error or a cost is unknown.

@@ -6,7 +6,7 @@ path it reads and writes.
 What moves paths is made from this table (`clvol.layout.stage_text`): the loop over a queue that each stage's
 kernel is, the functions that hand a path on, `to_shade(scene, group, slot, EVENT_WALK)`, and those that read
 and write a path's values.  A unit has those of its stage's contract and no others: what a contract does not
-name does not compile.  A test finds what a contract names in vain.
+name does not compile.  A test finds what is named but not used.
 """
 
 from __future__ import annotations
@@ -140,8 +140,8 @@ STAGES = (
         empties="GENERATE",
         does="Writes a finished path's result and starts the next job's path in its slot.",
         transitions=(
-            Transition("INTERSECT", "there is a job: a new path begins"),
-            Transition(IDLE, "there is none: the slot waits until there is"),
+            Transition("INTERSECT", "a job is left: a new path begins"),
+            Transition(IDLE, "no job is left: the slot is empty until there are jobs again"),
         ),
         reads=_fields("job radiance sample_weight largest_weight", _COUNTS, _FIRST_HIT),
         writes=_fields(
@@ -161,11 +161,16 @@ STAGES = (
         transitions=(
             Transition(
                 "MEDIUM",
-                "media come first; the event is what lies behind them",
+                "a medium is on the way to a surface or to infinity; the event says to which",
                 sets="event",
                 events=("ESCAPE", "SURFACE"),
             ),
-            Transition("SHADE", "none do", sets="event", events=("ESCAPE", "SURFACE")),
+            Transition(
+                "SHADE",
+                "no medium is on the way to a surface or to infinity; the event says to which",
+                sets="event",
+                events=("ESCAPE", "SURFACE"),
+            ),
         ),
         reads=_fields(_RAY, _PASSED, "bounce inside hit_t"),
         writes=_fields(_HIT, "inside origin medium_end"),
@@ -177,7 +182,7 @@ STAGES = (
         transitions=(
             Transition(
                 "SHADE",
-                "a collision; the walk needs another wave; or what lies behind, the event as it is",
+                "it collides, its walk needs another wave, or it leaves the media with its event as it was",
                 sets="event",
                 events=("COLLISION", "WALK"),
             ),
@@ -200,20 +205,20 @@ STAGES = (
         transitions=(
             Transition(
                 "MEDIUM",
-                "the walk goes on",
+                "its walk needed another wave, and goes on",
                 on=("WALK",),
                 sets="event",
                 events=("ESCAPE", "SURFACE"),
             ),
             Transition(
                 "SHADOW",
-                "there is a shadow ray, which the path waits for",
+                "it has a shadow ray, and waits for it before it goes on or ends",
                 on=("COLLISION", "SURFACE", "SHADOW"),
                 sets="goes_on",
                 shadow_ray=True,
             ),
-            Transition("INTERSECT", "the path goes on", on=("COLLISION", "SURFACE")),
-            Transition("GENERATE", "it ended", on=("ESCAPE", "COLLISION", "SURFACE")),
+            Transition("INTERSECT", "it goes on without a shadow ray", on=("COLLISION", "SURFACE")),
+            Transition("GENERATE", "it ended without a shadow ray", on=("ESCAPE", "COLLISION", "SURFACE")),
         ),
         reads=_fields(
             _RAY,
@@ -238,13 +243,13 @@ STAGES = (
         transitions=(
             Transition(
                 "SHADE",
-                "the walk needs another wave",
+                "the walk of its shadow ray needs another wave",
                 sets="event",
                 events=("SHADOW",),
                 shadow_ray=True,
             ),
-            Transition("INTERSECT", "the light is through, and the path goes on"),
-            Transition("GENERATE", "the light is through, and the path has ended"),
+            Transition("INTERSECT", "its shadow ray is through, and it goes on"),
+            Transition("GENERATE", "its shadow ray is through, and it has ended"),
         ),
         reads=_fields(_KEY, _COUNTS, _SHADOW_RAY, _SHADOW_LEG, "origin goes_on channel radiance exhausted"),
         writes=_fields(_COUNTS, _SHADOW_LEG, "shadow_inside shadow_light radiance exhausted"),

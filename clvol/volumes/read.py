@@ -14,10 +14,29 @@ from clvol.volumes.vol import read_vol
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Callable
 
     from clvol.volumes.grid import Grid
 
-SUFFIXES = (".vdb", ".vol", ".npy", ".npz")
+
+def _vdb(path: str | os.PathLike[str], grid: str | None) -> Grid:
+    return read_vdb(path) if grid is None else read_vdb(path, grid)
+
+
+def _vol(path: str | os.PathLike[str], grid: str | None) -> Grid:
+    if grid is not None:
+        raise VolumeError(f"a .vol file has no grid named {grid!r}", str(path), "leave the name out")
+    return read_vol(path)
+
+
+READERS: dict[str, Callable[[str | os.PathLike[str], str | None], Grid]] = {
+    ".vdb": _vdb,
+    ".vol": _vol,
+    ".npy": read_numpy,
+    ".npz": read_numpy,
+}
+"""Suffix -> reader of a file and of the grid that is named, if any."""
+SUFFIXES = tuple(READERS)
 CONVERSIONS = {".nvdb": NANOVDB}
 """Suffixes of volumes that cannot be read, and what makes one of them that can."""
 
@@ -33,11 +52,7 @@ def read_volume(path: str | os.PathLike[str], grid: str | None = None) -> Grid:
     Raises VolumeError as the reader of the format does, and for other suffixes.
     """
     suffix = Path(path).suffix.lower()
-    if suffix == ".vdb":
-        return read_vdb(path) if grid is None else read_vdb(path, grid)
-    if suffix in (".npy", ".npz"):
-        return read_numpy(path, grid)
-    if suffix != ".vol":
+    if suffix not in READERS:
         listed = f"{', '.join(SUFFIXES[:-1])} and {SUFFIXES[-1]}"
         if kind := other_kind(path):
             raise VolumeError(
@@ -45,6 +60,4 @@ def read_volume(path: str | os.PathLike[str], grid: str | None = None) -> Grid:
             )
         what = f"files ending in {suffix!r}" if suffix else "files without a suffix"
         raise VolumeError(f"{what} cannot be read, {listed} can", str(path), CONVERSIONS.get(suffix, ""))
-    if grid is not None:
-        raise VolumeError(f"a .vol file has no grid named {grid!r}", str(path), "leave the name out")
-    return read_vol(path)
+    return READERS[suffix](path, grid)
