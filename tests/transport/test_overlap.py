@@ -178,7 +178,7 @@ def test_a_medium_that_is_not_added_is_noticed():
 def test_weights_that_are_not_multiplied_are_noticed(monkeypatch):
     """The walk that wins keeps its own weight alone; without any repetition the mean stays right."""
     original = programs.kernel_source
-    repeated = "pass == 1 && part.medium == winner"
+    repeated = "pass == 1 && segment.medium == winner"
 
     def source(name):
         text = original(name)
