@@ -15,7 +15,7 @@ from clvol.base.progress import Progress, ProgressCallback, RichProgress
 from clvol.device.device import Device, open_device
 from clvol.errors import OptionError, shown
 from clvol.planning import registry
-from clvol.planning.choices import Choices
+from clvol.planning.choices import NUMBERS, Choices
 from clvol.planning.plan import Plan
 from clvol.rendering.adaptive import TargetRender
 from clvol.rendering.outcome import make_result
@@ -170,9 +170,18 @@ def plan(scene: Scene, **choices: Any) -> Plan:
 
     Raises
     ------
-    OptionError : a choice that won't do.
+    OptionError : a choice that won't do.  What depends on the volumes, as a step that is too fine, `render`
+        refuses.  "auto:pilot" is refused: what a pilot chooses is not known before it has rendered.
+    TypeError : a keyword that is no choice.
     """
     _check_scene("plan", scene)
+    for name in choices:
+        if name not in registry.FAMILIES and name not in NUMBERS:
+            known = ", ".join((*registry.FAMILIES, *NUMBERS))
+            raise TypeError(f"plan() takes the choices of a render ({known}), not {name!r}")
+    if choices.get("technique") == registry.PILOT:
+        hint = "plan the technique that it chose: the metadata of its render say which"
+        raise OptionError("what a pilot chooses is not known before it has rendered", hint=hint)
     names = {family: choices.pop(family, "auto") for family in registry.FAMILIES}
     for family, name in names.items():
         registry.check_choice(family, name)

@@ -64,8 +64,15 @@ def _tell_scene(file: str, definitions: dict[str, str], choices: dict[str, Any])
     from clvol.scene.describe import describe_scene
 
     scene = clvol.load_file(file, **definitions)
-    tell(map(printable, describe_scene(scene)))
-    plan = clvol.plan(scene, **choices)
-    asked = {family: choices[family] for family in FAMILIES}
-    notes = (f"note: {warning}" for warning in warnings(plan, asked))
-    tell(map(printable, ["", *plan.describe(), *notes]))
+    try:
+        plan = clvol.plan(scene, **choices)
+    except clvol.OptionError as refused:
+        if any(value not in ("auto", 1.0, None) for value in choices.values()):
+            raise
+        lines = [
+            f"note: cannot be rendered as it is: {refused}"
+        ]  # its own choices; it is described all the same
+    else:
+        asked = {family: choices[family] for family in FAMILIES}
+        lines = [*plan.describe(), *(f"note: {warning}" for warning in warnings(plan, asked))]
+    tell(map(printable, [*describe_scene(scene), "", *lines]))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from functools import cache
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class _Piece(NamedTuple):
     operand: str
 
 
-@cache
+@lru_cache(maxsize=512)
 def _pieces(text: str) -> list[_Piece]:
     """A file in its pieces; every stage of every plan expands the same files."""
     pieces: list[_Piece] = []

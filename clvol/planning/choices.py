@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from clvol.scene.records import Scene
 
 
+NUMBERS = ("majorant_scale", "step", "target_error", "aov")
+"""What may be chosen beside the names."""
+
+
 @dataclass(frozen=True, init=False)
 class Choices:
     """Everything a user may choose about how a picture is estimated, as ``Choices(technique="delta")``.

@@ -8,8 +8,6 @@ from collections.abc import Iterator, Mapping
 class Names(Mapping[str, str]):
     """A name for each of some families, hashable: equal where the same families have the same names."""
 
-    __slots__ = ("_names",)
-
     def __init__(self, names: Mapping[str, str]) -> None:
         self._names = dict(names)
 

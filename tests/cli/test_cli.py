@@ -307,6 +307,21 @@ def test_info_says_what_a_render_would_do_and_compile(scene: str) -> None:
         assert text in outcome.stdout
 
 
+def test_info_describes_a_scene_that_asks_for_what_cannot_be_right(scene: str, tmp_path: Path) -> None:
+    """Its own choice is noted, and one on the command line is refused."""
+    path = tmp_path / "impossible.xml"
+    integrator, point = '<integrator type="volpath"/>', '<emitter type="point"/>'
+    text = Path(scene).read_text(encoding="utf-8").replace(integrator, integrator + point)
+    path.write_text(text, encoding="utf-8")
+    assert_one_line_error(run("info", path, "--transmittance", "none"), "point, spot and directional")
+    own = '<integrator type="volpath"><string name="transmittance" value="none"/></integrator>'
+    path.write_text(text.replace(integrator, own), encoding="utf-8")
+    outcome = run("info", path)
+    assert outcome.exit_code == 0, outcome.output
+    assert "homogeneous medium" in outcome.stdout
+    assert "note: cannot be rendered as it is: transmittance 'none'" in outcome.stdout
+
+
 def test_info_takes_no_choices_for_a_volume() -> None:
     assert_one_line_error(run("info", SCENES / "cloud.vol", "--technique", "delta"), "--technique")
 

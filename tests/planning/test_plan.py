@@ -1,6 +1,7 @@
 """The plan of a render: worked out once, from records and choices alone, and said with its reasons."""
 
 import inspect
+import pickle
 import re
 import subprocess
 import sys
@@ -188,10 +189,16 @@ def test_plan_refuses_what_render_refuses():
         clvol.plan(scene(), transmittance="none")
     with pytest.raises(OptionError, match="takes a Scene"):
         clvol.plan("scene.xml")
-    with pytest.raises(OptionError, match="unknown technique 'auto:pilot'"):
+    with pytest.raises(OptionError, match="not known before it has rendered"):
         clvol.plan(scene(), technique="auto:pilot")
-    with pytest.raises(TypeError):
+    with pytest.raises(TypeError, match=r"choices of a render .*, not 'spp'"):
         clvol.plan(scene(), spp=4)
+
+
+def test_a_plan_can_be_pickled():
+    plan = clvol.plan(scene())
+    for protocol in range(pickle.HIGHEST_PROTOCOL + 1):
+        assert pickle.loads(pickle.dumps(plan, protocol)) == plan
 
 
 # -- prepared for a plan -----------------------------------------------------------------------------
