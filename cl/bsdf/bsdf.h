@@ -1,8 +1,8 @@
 /* The BSDF of a material: dispatches to the kinds that the scene has.
 
-   CLVOL_BSDF_<kind> is 1 for those; of the others nothing is compiled.  A mask is the `opacity` of a material, which the caller decides
-   first; all here is what is left of the surface then.  One-sided kinds reflect on the side of +z alone: the caller
-   picks the side's material and turns z (material_transmits). */
+   CLVOL_BSDF_<kind> is 1 for those; of the others nothing is compiled.  A mask is the `opacity` of a material, which
+   the caller decides first; all here is what is left of the surface then.  One-sided kinds reflect on the side of +z
+   alone: the caller picks the side's material and turns z (material_transmits). */
 #ifndef CLVOL_BSDF_BSDF_H
 #define CLVOL_BSDF_BSDF_H
 #include "bsdf/conductor.h"

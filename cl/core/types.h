@@ -8,8 +8,6 @@
 #define CLVOL_CORE_TYPES_H
 #include "core/math.h"
 
-#include "core/math.h"
-
 #if CLVOL_SPECTRUM == 1
 typedef float Spectrum;
 #define spectrum_max(s) abs_of(s)

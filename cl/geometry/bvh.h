@@ -1,11 +1,11 @@
 /* Traversal of clvol.accel.bvh's hierarchy: eight boxes, or a packet of eight triangles, at a time.
 
-   All hits of a ray are ordered by (t, primitive), and a caller walks through them by handing in the last one; so no box
-   may be left out because it begins as far away as the best hit, and none because of rounding.  Box tests
+   All hits of a ray are ordered by (t, primitive), and a caller walks through them by handing in the last one; so no
+   box may be left out because it begins as far away as the best hit, and none because of rounding.  Box tests
    multiply the end of an interval by REACH (Ize 2013): that covers the boxes' and the triangles' rounding as far as it
    grows with the distance from the origin.  The boxes themselves are padded for the rest.
 
-   A caller defines CLVOL_HAS_TRIANGLES, CLVOL_HAS_QUADRICS and CLVOL_BVH_STACK, the entries that the tree needs.
+   CLVOL_BVH_STACK is how many nodes may have to wait in the deepest tree that is built.
    scene->bvh_nodes and scene->bvh_triangles are rows of eight floats, as clvol/accel/bvh.py says. */
 #ifndef CLVOL_GEOMETRY_BVH_H
 #define CLVOL_GEOMETRY_BVH_H

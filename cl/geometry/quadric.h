@@ -1,8 +1,8 @@
 /* Where a ray meets a unit sphere, the unit disk in z = 0, or an open cylinder of radius 1 from z = 0 to 1, each
    under an affine map; t is the same on both sides of the map.
 
-   The quadratic is solved as in Haines et al. 2019 (Ray Tracing Gems, 7): the discriminant from the closest approach, so
-   that a far origin costs no digits, and the root that would cancel from the product of both. */
+   The quadratic is solved as in Haines et al. 2019 (Ray Tracing Gems, 7): the discriminant from the closest approach,
+   so that a far origin costs no digits, and the root that would cancel from the product of both. */
 #ifndef CLVOL_GEOMETRY_QUADRIC_H
 #define CLVOL_GEOMETRY_QUADRIC_H
 #include "core/shared.h"

@@ -5,10 +5,10 @@
 #include "core/shared.h"
 #include "core/types.h"
 
-/* Cuts [t0, t1] to one slab.  A ray along it, which over the box's length moves by no more than rounding, is all in or all
-   out: of the slab's two faces the lower counts, the upper does not, to rounding, so that of boxes side by side one
-   holds it.  All walks go by this one decision: density, majorants and cells reach on beyond the box as they are at
-   its border. */
+/* Cuts [t0, t1] to one slab.  A ray along it, which over the box's length moves by no more than rounding, is all in or
+   all out: of the slab's two faces the lower counts, the upper does not, to rounding, so that of boxes side by side
+   one holds it.  All walks go by this one decision: density, majorants and cells reach on beyond the box as they are
+   at its border. */
 INLINE void clip_slab(float lower, float upper, float o, float d, float along, float *t0, float *t1)
 {
     if (abs_of(d) <= along) {

@@ -1,9 +1,10 @@
-/* What scatterings at surfaces and in media have in common: the depth they may reach, and shadow rays. */
+/* What scatterings at surfaces and in media have in common: the depth they may reach, roulette, and shadow rays. */
 #ifndef CLVOL_STAGES_BOUNCE_H
 #define CLVOL_STAGES_BOUNCE_H
 #if CLVOL_NEE
 #include "emitter/light_sample.h"
 #endif
+#include "core/random.h"
 #include "core/scene.h"
 
 /* Whether the scattering numbered `bounce` is one too many; what it would have carried on is counted. */
@@ -17,6 +18,22 @@ INLINE bool depth_is_reached(const Scene *scene, uint slot, uint bounce, Spectru
     }
 #endif
     return false;
+}
+
+/* Whether the path goes on from the scattering numbered `bounce` only if it survives roulette.  `weight`: what it would
+   carry on; NaN goes on, to be seen. */
+INLINE bool meets_roulette(const Scene *scene, uint bounce, float weight)
+{
+    return bounce > scene->render->rr_depth && weight < 1.0f;
+}
+
+/* Roulette of a path of weight below 1, by the random number k. */
+INLINE bool survives_roulette(uint k, float weight, Spectrum *beta)
+{
+    if (!(uniform_float(k) < weight)) /* uniform_float may round to 1 */
+        return false;
+    *beta /= weight;
+    return true;
 }
 
 #if CLVOL_NEE

@@ -9,8 +9,8 @@
 /* Surfaces that one ray may pass before it is given up and counted. */
 #define MOST_PASSED 65536u
 
-/* Light that leaves a boundary along d is inside of it if d points behind the normal: said anew at every crossing, so that
-   a hit on an edge counts once, and an error of rounding does not outlast the next one. */
+/* Light that leaves a boundary along d is inside of it if d points behind the normal: said anew at every crossing, so
+   that a hit on an edge counts once, and an error of rounding does not outlast the next one. */
 INLINE void cross_boundary(__global const Shape *shape, float3 ng, float3 d, Inside *inside)
 {
 #if CLVOL_BOUNDARY_WORDS > 0

@@ -96,12 +96,9 @@ INLINE bool scatter(const Scene *scene, uint slot, SampleKey key, __global const
     const Ray ray = path_ray(scene, slot);
     *shadow_ray = next_event(scene, slot, key, medium, ray.o, ray.d, beta);
     const uint4 k = decision_block(scene, key, BLOCK_DIRECTION, 0);
-    if (key.bounce > scene->render->rr_depth) {
-        const float survival = min_of(1.0f, spectrum_max(beta) * path_eta_squared(scene, slot));
-        if (survival < 1.0f && !(uniform_float(k.z) < survival)) /* uniform_float may round to 1 */
-            return false;
-        beta /= survival;
-    }
+    const float weight = spectrum_max(beta) * path_eta_squared(scene, slot);
+    if (meets_roulette(scene, key.bounce, weight) && !survives_roulette(k.z, weight, &beta))
+        return false;
     float pdf;
     const float3 wi = phase_sample(scene, medium, ray.d, uniform_below_one(k.x), uniform_below_one(k.y),
                                    uniform_float(k.w), &pdf);

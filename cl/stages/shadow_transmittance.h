@@ -94,10 +94,10 @@ INLINE Ray shadow_ray(const Scene *scene, uint slot)
 }
 
 #if CLVOL_HAS_SURFACES
-/* The lamp's point that the ray runs to.  A line meets the front of a triangle, disk, sphere or cylinder once, so what it
-   meets there is that point, however t was rounded; a sphere or cylinder that shines outwards hides behind its front.
-   One that shines inwards may be met from behind first, and so may other triangles of a mesh: they hide the point, unless
-   they are as far as it is, where rounding alone decides which side of an edge the ray passes on. */
+/* The lamp's point that the ray runs to.  A line meets the front of a triangle, disk, sphere or cylinder once, so what
+   it meets there is that point, however t was rounded; a sphere or cylinder that shines outwards hides behind its
+   front.  One that shines inwards may be met from behind first, and so may other triangles of a mesh: they hide the
+   point, unless they are as far as it is, where rounding alone decides which side of an edge the ray passes on. */
 INLINE Target shadow_target(const Scene *scene, uint slot, Ray ray, float reach)
 {
     Target target = {NO_PRIMITIVE, NO_PRIMITIVE, 0, 0.0f};

@@ -100,15 +100,12 @@ INLINE bool leave_surface(const Scene *scene, uint slot, SampleKey key, const Su
 {
     const float eta_squared = CLVOL_HAS_TRANSMISSION ? path_eta_squared(scene, slot) * eta * eta : 1.0f;
     set_path_eta_squared(scene, slot, eta_squared);
-    const float survival = spectrum_max(beta) * eta_squared;
-    if (survival == 0.0f) /* not so for NaN, which is to be seen */
+    const float weight = spectrum_max(beta) * eta_squared;
+    if (weight == 0.0f) /* not so for NaN, which is to be seen */
         return false;
-    if (key.bounce > scene->render->rr_depth && survival < 1.0f) {
-        const uint4 k = decision_block(scene, key, BLOCK_DIRECTION, 0);
-        if (uniform_float(k.z) >= survival)
-            return false;
-        beta /= survival;
-    }
+    if (meets_roulette(scene, key.bounce, weight) &&
+        !survives_roulette(decision_block(scene, key, BLOCK_DIRECTION, 0).z, weight, &beta))
+        return false;
     Inside inside = path_inside(scene, slot);
     cross_boundary(scene->shapes + surface->shape, surface->ng, d, &inside);
     set_path_inside(scene, slot, inside);

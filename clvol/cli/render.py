@@ -104,7 +104,12 @@ class RenderCommand(ExplainedCommand):
     metavar="STOPS",
     help="Brighten a .png by so many stops.",
 )
-@click.option("-v", "--verbose", is_flag=True, help="Print features, built units, memory and time by stage.")
+@click.option(
+    "-v",
+    "--verbose",
+    is_flag=True,
+    help="Print the plan as `clvol info` does, with choices and their reasons, memory, and time by stage.",
+)
 @quiet_option
 def render(
     scene: str,

@@ -49,17 +49,17 @@ def kernel_source(name: str) -> str:
 
 
 def expand(
-    text: str, macros: Mapping[str, int], slots: Mapping[str, str], records: str, contract: str = ""
+    text: str, macros: Mapping[str, int], slots: Mapping[str, str], layout_text: str, contract: str = ""
 ) -> str:
     """A translation unit of `text` and all that it includes.
 
-    `records` stands in core/scene.h, and `contract` in path/transitions.h.
+    `layout_text` stands in core/scene.h, and `contract` in path/transitions.h.
 
     Only the macros that occur in it are defined: caches are keyed on the text, and stages that a choice
     does not touch are not built again.
     """
     shared = layout.shared_text(), layout.kinds_text("BSDF"), layout.kinds_text("PHASE")
-    generated = {LAYOUT: records, CONTRACT: contract} | dict(zip(SHARED.values(), shared, strict=True))
+    generated = {LAYOUT: layout_text, CONTRACT: contract} | dict(zip(SHARED.values(), shared, strict=True))
 
     def read(name: str) -> str:
         return generated[name] if name in generated else kernel_source(name)
@@ -79,10 +79,10 @@ def compose(
     stage: Stage | None = None,
 ) -> str:
     """The translation unit of `text` for a plan, and more macros; `stage`: whose contract holds."""
-    records = layout.layout_text(plan.macros, stage)
+    layout_text = layout.layout_text(plan.macros, stage)
     contract = layout.stage_text(plan.macros, stage) if stage else ""
     slots = {f"CLVOL_{family.upper()}_HEADER": header for family, header in plan.slots.items()}
-    return expand(text, {**plan.macros, **macros}, slots, records, contract)
+    return expand(text, {**plan.macros, **macros}, slots, layout_text, contract)
 
 
 def stage_source(plan: Plan, stage: str) -> str:

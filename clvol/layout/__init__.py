@@ -1,8 +1,9 @@
 """What the device sees: every record, path-state field, queue and kernel argument, described once.
 
-Python's dtypes and OpenCL's text are both made from the tables here; a test compares sizes and offsets on the
-device.  What a scene has of them follows from the macros of its plan (`clvol.planning`).  No value of a scene
-belongs here, only its shape, and nothing of clvol but its errors is imported.
+Python's dtypes and OpenCL's text are both made from the tables here; tests/layout/test_records.py compares
+sizes and offsets on the device.  What a scene has of them follows from the macros of its plan
+(`clvol.planning`).  No value of a scene belongs here, only its shape, and nothing of clvol but its errors is
+imported.
 """
 
 from clvol.layout.arguments import ARGUMENTS, Argument, arguments
@@ -58,7 +59,7 @@ from clvol.layout.records import (
 )
 from clvol.layout.shared_text import kinds_text, record_text, shared_text
 from clvol.layout.stage_text import stage_text
-from clvol.layout.stages import EVENTS, QUEUES, STAGES, launched, stage
+from clvol.layout.stages import EVENTS, QUEUES, STAGES, launched, stage, targets
 from clvol.layout.text import layout_text
 
 __all__ = [
@@ -121,4 +122,5 @@ __all__ = [
     "slot_fields",
     "stage",
     "stage_text",
+    "targets",
 ]

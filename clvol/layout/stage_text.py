@@ -64,7 +64,7 @@ def contract_lines(stage: Stage) -> list[str]:
 
 @cache
 def contract_comment(stage: Stage) -> str:
-    """The contract as the head of the stage's unit."""
+    """The contract as a comment, which stands before the transitions that are made from it."""
     lines = [
         part
         for line in contract_lines(stage)

@@ -269,3 +269,10 @@ def stage(name: str) -> Stage:
 def launched(macros: Macros) -> tuple[str, ...]:
     """Names of the stages that a wave launches, in order."""
     return tuple(s.name for s in STAGES if not s.needs or macros[s.needs])
+
+
+def targets(stage: Stage, macros: Macros) -> tuple[str, ...]:
+    """Where a stage hands paths on to: IDLE, and queues that a launched stage empties."""
+    emptied = {other.empties for other in STAGES if other.name in launched(macros)}
+    found = dict.fromkeys(t.to for t in stage.transitions if t.to == IDLE or t.to in emptied)
+    return tuple(found)

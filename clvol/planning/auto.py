@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from clvol.planning.features import Features
 
 DEFAULT_SAMPLER = "sobol"
-WEIGHED = "auto"
+UNSETTLED = "auto"
 """The majorant of a plan until the volumes are prepared, which show what each kind would cost."""
 
 
@@ -31,7 +31,10 @@ def resolve(
     rules = {
         "technique": _technique(features, asked),
         "transmittance": _transmittance(features),
-        "majorant": (WEIGHED, "the one of least expected cost, once the volumes are prepared"),
+        "majorant": (
+            UNSETTLED,
+            "chosen by expected cost once the volumes are prepared (clvol render -v shows it)",
+        ),
         "lookup": ("exact", "the volume's own filter"),
         "absorption": ("mixed", "no path is absorbed that weighs much, none followed that weighs little"),
         "probability": ("history", "weights stay bounded"),
@@ -63,7 +66,8 @@ def _technique(features: Features, asked: Mapping[str, str]) -> tuple[str, str]:
     """
     sampler = DEFAULT_SAMPLER if asked["sampler"] == "auto" else asked["sampler"]
     hurdles = {
-        "not every medium glows in the dark": not features.dark_emission,
+        "nothing emits": not features.emission,
+        "not every medium emits with an albedo of at most 0.5": not features.only_dark_emitters,
         "media may overlap": features.media_overlap,
         "channels are attenuated differently": features.chromatic_extinction,
         "samples are independent": sampler != "sobol",
@@ -75,19 +79,11 @@ def _technique(features: Features, asked: Mapping[str, str]) -> tuple[str, str]:
             "regular",
             "collisions are the light, and one low-discrepancy number places a whole flight",
         )
-    return "delta", f"exact flights would not pay: {against[0]}"
+    return "delta", f"regular would not pay: {against[0]}"
 
 
 def _transmittance(features: Features) -> tuple[str, str]:
     """Scattering finds a constant sky as well as sampling it does, without the shadow ray."""
-    lights = {
-        "an envmap": features.envmap,
-        "directional": features.directional,
-        "points": features.point_lights,
-        "spots": features.spot,
-        "area lights": features.area,
-    }
-    found = [name for name, there in lights.items() if there]
-    if found:
-        return "ratio", f"lights to sample: {', '.join(found)}"
+    if features.sampled_lights:
+        return "ratio", f"lights to sample: {', '.join(features.sampled_lights)}"
     return "none", "scattered paths find a uniform sky by themselves" if features.constant else "no light"

@@ -71,7 +71,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_HAS_TRANSMISSION": int(f.transmissive),
         "CLVOL_BOUNDARY_WORDS": f.boundary_words,
         "CLVOL_CAMERA_INSIDE": int(f.camera_inside),
-        "CLVOL_BVH_STACK": layout.BVH_STACK,
+        "CLVOL_BVH_STACK": layout.BVH_STACK if f.surfaces else 0,
         **{f"CLVOL_BSDF_{name}": int(name in f.bsdfs) for name in layout.BSDFS},
         "CLVOL_HAS_FILTER_TABLE": int(f.filter_table),
         "CLVOL_HAS_SIGNED_FILTER": int(f.signed_filter),

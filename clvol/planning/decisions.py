@@ -40,7 +40,7 @@ class Decisions:
     reasons: Names
     boundaries: Boundaries = field(repr=False, compare=False)
     settled: Settled | None = None
-    tuning: Tuning = field(default_factory=Tuning)
+    tuning: Tuning = field(default_factory=lambda: Tuning(known=False))
 
     @property
     def tracker(self) -> registry.Choice:

@@ -30,13 +30,26 @@ def describe_plan(plan: Decisions) -> Iterator[str]:
     yield "stages, in the order of launches: from which queue, to which"
     for name in layout.launched(macros):
         stage = layout.stage(name)
-        towards = dict.fromkeys(transition.to for transition in stage.transitions)
+        towards = layout.targets(stage, macros)
         yield f"  {name:<21} {stage.empties:<10} {', '.join(towards)}"
     fields = layout.path_fields(macros)
     yield from _paragraph("path state", f"{4 * len(fields)} bytes per slot: {_values(macros)}")
     yield from _paragraph("headers chosen, in cl/", ", ".join(chosen_headers(plan)))
-    defined = (f"{name.removeprefix('CLVOL_')}={value}" for name, value in macros.items() if value)
-    yield from _paragraph("macros other than 0, CLVOL_", ", ".join(defined))
+    yield from _paragraph("macros other than 0, CLVOL_", ", ".join(_defined(plan, macros)))
+
+
+def _defined(plan: Decisions, macros: layout.Macros) -> Iterator[str]:
+    """Macros other than 0; numbered choices in force by name; sizes of groups once a device has said them."""
+    used = used_names(plan)
+    for macro, value in macros.items():
+        name = macro.removeprefix("CLVOL_")
+        if name in ("LOCAL_SIZE", "GROUP_SLOTS") and not plan.tuning.known:
+            continue
+        if name in ("ABSORPTION", "PROBABILITY"):
+            if used[name.lower()] != "none":
+                yield f"{name}={layout.ENUMS[name][value]}"
+        elif value:
+            yield f"{name}={value}"
 
 
 def _values(macros: layout.Macros) -> str:

@@ -4,6 +4,15 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 
+SAMPLED_LIGHTS = {
+    "envmap": "an envmap",
+    "directional": "directional",
+    "point_lights": "points",
+    "spot": "spots",
+    "area": "area lights",
+}
+"""Lights that are worth shadow rays, as all are but a uniform sky; in words."""
+
 
 @dataclass(frozen=True)
 class Features:
@@ -25,7 +34,7 @@ class Features:
     emission: bool = False
     emission_volumes: bool = False
     temperature: bool = False
-    dark_emission: bool = False
+    only_dark_emitters: bool = False
     trilinear: bool = False
     nearest: bool = False
     coloured_volumes: bool = False
@@ -73,6 +82,14 @@ class Features:
         return self.area_meshes or self.area_spheres or self.area_disks or self.area_cylinders
 
     @property
+    def sampled_lights(self) -> list[str]:
+        """Kinds of light that are worth shadow rays, in words."""
+        found = [words for name, words in SAMPLED_LIGHTS.items() if getattr(self, name)]
+        if not found and self.emitters > self.constant:
+            raise ValueError("a scene has lights that no entry of SAMPLED_LIGHTS stands for")
+        return found
+
+    @property
     def near_lights(self) -> bool:
         """Lights at a finite distance."""
         return self.point_lights or self.spot or self.area
@@ -89,7 +106,7 @@ class Features:
 
     def found(self) -> str:
         """One line that names what is there, for the log."""
-        return ", ".join(_said(name, value) for name, value in asdict(self).items() if value)
+        return "; ".join(_said(name, value) for name, value in asdict(self).items() if value)
 
 
 def _said(name: str, value: object) -> str:

@@ -19,14 +19,15 @@ def used_names(plan: Decisions) -> Names:
     walks = features.heterogeneous
     analytic = "analytic" if features.homogeneous else "none"
     interpolates = features.trilinear or not features.nearest
-    chooses = plan.spectrum == 3 and (plan.extinction == 3 or chosen["absorption"] == "sample")
+    on_walks = walks and plan.weighted and plan.extinction == 3
+    absorbed = features.scattering and features.chromatic_albedo and chosen["absorption"] == "sample"
     used = {
         "technique": chosen["technique"] if walks else analytic,
         "transmittance": (chosen["transmittance"] if walks else analytic) if plan.nee else "none",
         "majorant": chosen["majorant"] if plan.walks_majorants else "none",
         "lookup": chosen["lookup"] if walks and interpolates else "none",
         "absorption": chosen["absorption"] if features.media and features.scattering else "none",
-        "probability": chosen["probability"] if walks and plan.weighted and chooses else "none",
+        "probability": chosen["probability"] if plan.spectrum == 3 and (on_walks or absorbed) else "none",
         "control": chosen["control"] if plan.needs_residuals else "none",
         "sampler": chosen["sampler"],
     }
@@ -59,7 +60,7 @@ def reasons(plan: Decisions) -> dict[str, str]:
         "majorant": "nothing walks majorant cells",
         "lookup": "samples are not interpolated" if features.heterogeneous else "no density is looked up",
         "absorption": "no medium scatters",
-        "probability": "no walk has weights of several channels",
+        "probability": "no path chooses between events by weights of several channels",
         "control": "only residual-ratio subtracts one",
         "sampler": "",
     }
@@ -68,6 +69,17 @@ def reasons(plan: Decisions) -> dict[str, str]:
         meant = name == plan.chosen[family] and not (family == "majorant" and name == "none")
         found[family] = plan.reasons[family] if meant else without[family]
     return found
+
+
+def _instead(plan: Decisions, family: str, used: str) -> str:
+    """What is to be said of a choice that was made, and is not in force as it stands."""
+    if used == "none":
+        return f" is not used: nothing in this render needs {'an' if family[0] in 'aeiou' else 'a'} {family}"
+    if family == "transmittance":
+        return ": shadow rays, whose transmittance is analytic here"
+    if plan.features.chromatic_extinction and plan.tracker.all_channels:
+        return ": one path follows all channels, however far apart; its flights are analytic here"
+    return f" is not used: the scene's media need only the {used} rule"
 
 
 def warnings(plan: Decisions, asked: Mapping[str, str]) -> Iterator[str]:
@@ -80,10 +92,7 @@ def warnings(plan: Decisions, asked: Mapping[str, str]) -> Iterator[str]:
     used, features = used_names(plan), plan.features
     for family, value in asked.items():
         if value not in ("auto", used[family]):
-            reason = f"the scene's media need only the {used[family]} rule"
-            if used[family] == "none":
-                reason = f"nothing in this render needs {'an' if family[0] in 'aeiou' else 'a'} {family}"
-            yield f"{family} {value} is not used: {reason}"
+            yield f"{family} {value}{_instead(plan, family, used[family])}"
     if plan.choices.majorant_scale != 1 and used["majorant"] == "none":
         yield "majorant_scale is not used: nothing in this render walks a majorant"
     if not features.emitters and not features.emission:

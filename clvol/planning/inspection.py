@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, assert_never
 
 from clvol.base.rows import bands
 from clvol.planning.features import Features
@@ -23,7 +23,7 @@ from clvol.scene.material_facts import is_grey as bsdf_is_grey
 from clvol.scene.medium_facts import (
     bounding_kind,
     channels_of,
-    glows_in_the_dark,
+    is_dark_emitter,
     is_grey,
     is_homogeneous,
     medium_volumes,
@@ -97,7 +97,7 @@ def _medium_features(media: list[records.Medium]) -> dict[str, Any]:
         "emission": bool(emissive),
         "emission_volumes": any(isinstance(m.emission, records.GridVolume) for m in emissive),
         "temperature": any(isinstance(m.temperature, records.GridVolume) for m in emissive),
-        "dark_emission": bool(varied) and all(map(glows_in_the_dark, varied)),
+        "only_dark_emitters": bool(varied) and all(map(is_dark_emitter, varied)),
         "phases": tuple(sorted(kind.upper() for kind in phases)),
         "blend": any(len(mixture) > 1 for mixture in lobes),
         "scattering": any(map(scatters, media)),
@@ -143,21 +143,13 @@ def _light_features(
     lamps: list[records.Shape],
 ) -> dict[str, Any]:
     """Where light comes from; `lamps`: the surfaces that shine."""
-    kinds = {type(e) for e in scene.emitters}
+    kinds = {*map(_emitter_kind, scene.emitters), *map(_lamp_kind, lamps)}
     grey = all(map(_emitter_is_grey, scene.emitters)) and all(len(set(s.emission or ())) == 1 for s in lamps)
     sampled = any(m.sample_emitters for m in media) or bool(surfaces)
     return {
         "emitters": len(scene.emitters) + len(lamps),
         "chromatic_light": not grey,
-        "constant": records.ConstantEmitter in kinds,
-        "envmap": records.EnvmapEmitter in kinds,
-        "directional": records.DirectionalEmitter in kinds,
-        "point_lights": records.PointEmitter in kinds,
-        "spot": records.SpotEmitter in kinds,
-        "area_meshes": any(s.kind not in QUADRICS for s in lamps),
-        "area_spheres": any(s.kind == "sphere" for s in lamps),
-        "area_disks": any(s.kind == "disk" for s in lamps),
-        "area_cylinders": any(s.kind == "cylinder" for s in lamps),
+        **dict.fromkeys(kinds, True),
         "samples_lights": bool(scene.emitters or lamps) and sampled,
     }
 
@@ -177,14 +169,33 @@ def _clips_homogeneous(found: Boundaries) -> bool:
     )
 
 
+def _emitter_kind(emitter: records.Emitter) -> str:
+    """The feature that stands for a light of this kind."""
+    match emitter:
+        case records.ConstantEmitter():
+            return "constant"
+        case records.EnvmapEmitter():
+            return "envmap"
+        case records.DirectionalEmitter():
+            return "directional"
+        case records.PointEmitter():
+            return "point_lights"
+        case records.SpotEmitter():
+            return "spot"
+    assert_never(emitter)
+
+
+def _lamp_kind(lamp: records.Shape) -> str:
+    """The feature that stands for a shape of this kind that shines."""
+    return f"area_{lamp.kind}s" if lamp.kind in QUADRICS else "area_meshes"
+
+
 def _emitter_is_grey(emitter: records.Emitter) -> bool:
-    if isinstance(emitter, records.EnvmapEmitter):
-        r = emitter.radiance
-        return all(bool((r[rows] == r[rows, :, :1]).all()) for rows in bands(*r.shape[:2]))
-    value = {
-        records.ConstantEmitter: "radiance",
-        records.DirectionalEmitter: "irradiance",
-        records.PointEmitter: "intensity",
-        records.SpotEmitter: "intensity",
-    }[type(emitter)]
-    return len(set(getattr(emitter, value))) == 1
+    match emitter:
+        case records.EnvmapEmitter(radiance=r):
+            return all(bool((r[rows] == r[rows, :, :1]).all()) for rows in bands(*r.shape[:2]))
+        case records.ConstantEmitter(radiance=value) | records.DirectionalEmitter(irradiance=value):
+            return len(set(value)) == 1
+        case records.PointEmitter(intensity=value) | records.SpotEmitter(intensity=value):
+            return len(set(value)) == 1
+    assert_never(emitter)

@@ -46,7 +46,9 @@ class Tuning:
     Parameters
     ----------
     local_size : work-items of a group.  group_slots : path slots of a group.
+    known : a device has been asked; the sizes are a guess before.
     """
 
     local_size: int = 1
     group_slots: int = 256
+    known: bool = True

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from clvol.scene.medium_facts import channels_of
 from clvol.scene.reader import BRIGHTEST, ROUNDING, Reader
 from clvol.scene.records import ConstVolume, GridVolume, Medium, Phase, Spectrum, Volume
-from clvol.scene.volume import channels_of, largest_value, limited
+from clvol.scene.volume import largest_value, limited
 from clvol.volumes import check_coefficients, check_finite
 from clvol.volumes.grid import DenseGrid
 from clvol.volumes.proportional import proportional_channels

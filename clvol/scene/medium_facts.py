@@ -70,8 +70,10 @@ def _numbered(objects: Iterable[_T]) -> tuple[list[_T], list[int]]:
     return distinct, numbers
 
 
-def channels_of(volume: records.GridVolume) -> int:
-    """Channels of a grid volume: 1 or 3."""
+def channels_of(volume: records.Volume) -> int:
+    """Channels of a volume: 1 or 3."""
+    if isinstance(volume, records.ConstVolume):
+        return len(volume.value)
     return volume.grid.values.shape[-1] if isinstance(volume.grid, DenseGrid) else 1
 
 
@@ -93,7 +95,7 @@ def scatters(medium: records.Medium) -> bool:
     return bool((np.array(albedo) * np.array(medium.scale) > 0).any())
 
 
-def glows_in_the_dark(medium: records.Medium) -> bool:
+def is_dark_emitter(medium: records.Medium) -> bool:
     """Emits, and absorbs at least as much as it scatters, everywhere."""
     dark = isinstance(medium.albedo, records.ConstVolume) and max(medium.albedo.value) <= 0.5
     return medium.emits and dark

@@ -127,13 +127,6 @@ def _sparse_volume(reader: Reader, grid: SparseGrid) -> Volume:
     )
 
 
-def channels_of(volume: Volume) -> int:
-    """Channels of a volume: 1 or 3."""
-    if isinstance(volume, ConstVolume):
-        return len(volume.value)
-    return volume.grid.values.shape[-1] if isinstance(volume.grid, DenseGrid) else 1
-
-
 def largest_value(volume: Volume) -> float:
     """Upper bound of a volume's values in every channel; NaN when it holds one."""
     if isinstance(volume, ConstVolume):

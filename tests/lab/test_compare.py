@@ -20,7 +20,7 @@ from clvol.errors import OptionError
 from clvol.lab.comparison.bar import progress_words
 from clvol.lab.comparison.combine import Lineup, open_lineup
 from clvol.lab.comparison.figures import compute_figures
-from clvol.lab.comparison.measure import REFERENCE_SAMPLES, Measured, Plan, measure
+from clvol.lab.comparison.measure import REFERENCE_SAMPLES, Effort, Measured, measure
 from clvol.lab.comparison.plots import plain_number
 from clvol.lab.comparison.reference import Reference, read_reference
 from clvol.lab.comparison.report import as_json, check_folder, write_report
@@ -93,11 +93,11 @@ class MadeUp:
         )
 
 
-def measured(trials: dict[str, MadeUp], plan: Plan) -> Comparison:
+def measured(trials: dict[str, MadeUp], effort: Effort) -> Comparison:
     """A comparison of made-up trials."""
     told: list[tuple[float, float, str]] = []
     found, reference, interrupted = measure(
-        Lineup(trials), plan, None, MadeUp, lambda *record: told.append(record)
+        Lineup(trials), effort, None, MadeUp, lambda *record: told.append(record)
     )
     assert all(done <= total + 1e-6 for done, total, _ in told if total)
     labels = list(trials)
@@ -150,7 +150,7 @@ def test_doubles_are_measured_once_and_impossible_ones_left_out(device, scene_fi
 
 def test_rounds_take_equal_time_seeds_differ_and_the_reference_has_ten_times_the_samples() -> None:
     trials = {"fast": MadeUp(rate=4000), "slow": MadeUp(rate=1000)}
-    comparison = measured(trials, Plan(rounds=5, seconds=5.0, seed=7))
+    comparison = measured(trials, Effort(rounds=5, seconds=5.0, seed=7))
     fast, slow = (f.measured for f in comparison.figures)
     assert fast.spp == pytest.approx(4000, rel=0.01) and slow.spp == pytest.approx(1000, rel=0.01)
     assert [*fast.shorter] == [fast.spp // 4, fast.spp // 16]
@@ -164,9 +164,9 @@ def test_rounds_take_equal_time_seeds_differ_and_the_reference_has_ten_times_the
 
 def test_a_biased_combination_never_makes_the_reference() -> None:
     trials = {"biased": MadeUp(bias=0.5, sigma=0.1), "honest": MadeUp()}
-    comparison = measured(trials, Plan(rounds=4, spp=8))
+    comparison = measured(trials, Effort(rounds=4, spp=8))
     assert comparison.reference.image.mean() == pytest.approx(1, abs=0.05)
-    alone = measured({"biased": MadeUp(bias=0.5)}, Plan(rounds=4, spp=8))
+    alone = measured({"biased": MadeUp(bias=0.5)}, Effort(rounds=4, spp=8))
     assert alone.reference.image.mean() == pytest.approx(1, abs=0.05)
 
 
@@ -175,11 +175,11 @@ def test_ctrl_c_keeps_complete_rounds_but_not_too_few() -> None:
         "first": MadeUp(),
         "second": MadeUp(sigma=9.0, ctrl_c=4 + 6),
     }  # four to try it out, then six rounds
-    comparison = measured(trials, Plan(rounds=10, spp=4))
+    comparison = measured(trials, Effort(rounds=10, spp=4))
     assert comparison.interrupted and len(comparison.figures[0].seconds) == 6
     assert any("Interrupted" in sentence for sentence in comparison.words)
     with pytest.raises(KeyboardInterrupt):
-        measured({"first": MadeUp(ctrl_c=5)}, Plan(rounds=10, spp=4))
+        measured({"first": MadeUp(ctrl_c=5)}, Effort(rounds=10, spp=4))
 
 
 def test_seeds_leave_out_those_of_a_given_reference() -> None:
@@ -197,8 +197,8 @@ def test_twice_the_samples_a_second_are_twice_the_efficiency_in_words_too() -> N
     """Its 95 % interval has the truth in so many of 40 comparisons, with a false alarm once in 10,000."""
     repeats, covered, planted = 40, 0, 0
     for repeat in range(repeats):
-        plan = Plan(rounds=8, seconds=64.0, seed=1000 * repeat)
-        comparison = measured({"a": MadeUp(rate=1000), "b": MadeUp(rate=4000)}, plan)
+        effort = Effort(rounds=8, seconds=64.0, seed=1000 * repeat)
+        comparison = measured({"a": MadeUp(rate=1000), "b": MadeUp(rate=4000)}, effort)
         by_time = comparison["b"].efficiency["seconds"]
         assert by_time.significant
         covered += by_time.ratio.low < 4 < by_time.ratio.high
@@ -213,7 +213,7 @@ def test_a_planted_bias_is_seen_flattens_the_curve_and_is_told() -> None:
     trials = {"good": MadeUp(sigma=0.5), "bad": MadeUp(bias=0.2)}
     trials["liar"] = MadeUp(bias=0.2)
     trials["liar"].biased = False
-    comparison = measured(trials, Plan(rounds=10, spp=16))
+    comparison = measured(trials, Effort(rounds=10, spp=16))
     assert [f.verdict.agrees for f in comparison.figures] == [True, False, False]
     assert comparison["good"].slope.low <= -1 <= comparison["good"].slope.high
     assert comparison["bad"].slope.low > -1
@@ -237,7 +237,7 @@ def test_the_slope_of_one_render_over_its_samples_and_its_interval() -> None:
 
 
 def test_a_slope_that_chance_made_flat_is_not_called_bias() -> None:
-    figures = measured({"good": MadeUp()}, Plan(rounds=4, spp=4))["good"]
+    figures = measured({"good": MadeUp()}, Effort(rounds=4, spp=4))["good"]
     flat, steep = (replace(figures, slope=Interval(*ends)) for ends in ((-0.9, -0.95, -0.85), (-2, -3, -1.5)))
     assert "chance does that" in _slope(flat) and "flattens" not in _slope(flat)
     assert "chance does that" in _slope(steep) and "separate renders of 4 spp" in _slope(steep)
@@ -287,14 +287,14 @@ def test_a_given_variance_counts_with_the_freedom_it_has(tmp_path: Path, device,
 
 def test_renders_that_draw_from_sobol_have_a_power_of_two_of_samples() -> None:
     trials = {"a": MadeUp(rate=1100), "b": MadeUp(rate=3)}
-    plain = measured(trials, Plan(rounds=4, seconds=4.0))
+    plain = measured(trials, Effort(rounds=4, seconds=4.0))
     assert plain["a"].measured.spp == pytest.approx(1100, abs=1)
     trials["a"].names = {"technique": "delta", "sampler": "sobol"}
-    drawn = measured(trials, Plan(rounds=4, seconds=4.0))
+    drawn = measured(trials, Effort(rounds=4, seconds=4.0))
     assert [f.measured.spp for f in drawn.figures] == [1024, 4] and drawn.reference.spp == 4 * 8192
     assert any("at 4 against 1024 spp a render" in text for text in drawn.words)
     assert not any("Sobol'" in text for text in drawn.words)
-    assert any("it has 6" in text for text in measured(trials, Plan(rounds=4, spp=6)).words)
+    assert any("it has 6" in text for text in measured(trials, Effort(rounds=4, spp=6)).words)
 
 
 def test_what_only_the_first_open_pays_for_is_not_the_first_combination_s(monkeypatch) -> None:
@@ -316,17 +316,17 @@ def test_what_only_the_first_open_pays_for_is_not_the_first_combination_s(monkey
 
 def test_the_table_cuts_no_name_however_long() -> None:
     labels = [f"weighted-decomposition/residual-ratio/kdtree/stochastic/{'x' * 90}/{n}" for n in range(2)]
-    lines = repr(measured({label: MadeUp() for label in labels}, Plan(rounds=4, spp=4))).splitlines()
+    lines = repr(measured({label: MadeUp() for label in labels}, Effort(rounds=4, spp=4))).splitlines()
     assert all(sum(label in line for line in lines) == 1 for label in labels)
 
 
 def test_a_narrow_terminal_has_a_paragraph_a_combination_and_a_star_its_footnote() -> None:
-    made = measured({"a": MadeUp(rate=1000), "b": MadeUp(rate=4000)}, Plan(rounds=8, seconds=64.0))
+    made = measured({"a": MadeUp(rate=1000), "b": MadeUp(rate=4000)}, Effort(rounds=8, seconds=64.0))
     wide, narrow = text_table(made, 1000), text_table(made, 80)
     assert max(map(len, narrow.splitlines())) <= 80 and {"a", "b"} < {*narrow.splitlines()}
     assert "no bias seen" in wide and "no bias seen" in narrow
     assert wide.endswith("* significantly different from a") and narrow.endswith("different from a")
-    assert "*" not in text_table(measured({"a": MadeUp(), "b": MadeUp()}, Plan(rounds=4, spp=4)))
+    assert "*" not in text_table(measured({"a": MadeUp(), "b": MadeUp()}, Effort(rounds=4, spp=4)))
 
 
 def test_one_combination_is_compared_with_a_reference_only(scene_file: Path, caplog) -> None:
@@ -379,7 +379,7 @@ def test_a_reference_without_variance_is_used_with_a_warning(
 
 
 def test_the_report_is_whole_escaped_and_without_nan(tmp_path: Path) -> None:
-    comparison = measured({"a": MadeUp(), "<b>": MadeUp(bias=0.1)}, Plan(rounds=4, spp=4))
+    comparison = measured({"a": MadeUp(), "<b>": MadeUp(bias=0.1)}, Effort(rounds=4, spp=4))
     write_report(comparison, tmp_path / "report")
     text = (tmp_path / "report" / "report.json").read_text()
     written = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} in the JSON"))
@@ -397,7 +397,7 @@ def test_the_report_is_whole_escaped_and_without_nan(tmp_path: Path) -> None:
 
 
 def test_only_an_earlier_report_is_replaced_and_a_failure_leaves_it(tmp_path: Path, monkeypatch) -> None:
-    comparison = measured({"a": MadeUp()}, Plan(rounds=4, spp=4))
+    comparison = measured({"a": MadeUp()}, Effort(rounds=4, spp=4))
     folder = tmp_path / "report"
     monkeypatch.setattr("clvol.lab.comparison.report.plots", lambda _: {})
     comparison.save(folder)
@@ -454,6 +454,6 @@ def test_mistakes_on_the_command_line(
 
 
 def test_as_json_holds_plain_values_only() -> None:
-    comparison = measured({"a": MadeUp(sigma=0.0)}, Plan(rounds=4, spp=4))  # no error at all
+    comparison = measured({"a": MadeUp(sigma=0.0)}, Effort(rounds=4, spp=4))  # no error at all
     json.dumps(as_json(comparison), allow_nan=False)
     assert "a" in repr(comparison)

@@ -38,6 +38,10 @@ def test_every_queue_is_emptied_by_one_stage_which_never_pushes_to_it():
         assert {t.to for t in stage.transitions} <= {*QUEUES, IDLE}
 
 
+def test_the_counters_of_a_group_have_room_for_every_queue_and_for_idle_slots():
+    assert len(QUEUES) + 1 <= layout.QUEUE_LENGTHS_STRIDE
+
+
 def test_contracts_name_values_and_events_that_there_are():
     values = {declared.name for declared in layout.PATH_STATE}
     for stage in STAGES:

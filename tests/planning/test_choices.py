@@ -12,6 +12,7 @@ import clvol
 from clvol import render
 from clvol.errors import OptionError
 from clvol.planning.choices import Choices
+from clvol.planning.in_force import warnings
 from clvol.planning.plan import Plan
 from clvol.scene.records import ConstantEmitter, ConstVolume, DirectionalEmitter
 
@@ -135,6 +136,40 @@ def test_a_choice_without_use_is_answered_with_a_warning(choices, word, caplog):
     with caplog.at_level(logging.WARNING, "clvol"):
         render(scene(), spp=1, **choices)
     assert word in caplog.text and "not used" in caplog.text
+
+
+def said_in_fog(sigma_t, **choices):
+    """Warnings on homogeneous fog of coloured albedo, and the picture."""
+    fog = picture(
+        [box(*CUBE, homogeneous(sigma_t, (0.9, 0.5, 0.2)))], (SKY,), (0.4, 0.5, -3.0), (0.5, 0.5, 0.5)
+    )
+    plan = Plan.of(fog, Choices(**choices))
+    image = render(fog, spp=4, seed=1, **choices).image
+    return list(warnings(plan, choices)), image
+
+
+@pytest.mark.parametrize(
+    ("sigma_t", "choices", "family", "names"),
+    [
+        (1.0, {}, "transmittance", ("none", "ratio")),
+        ((1.0, 2.0, 3.0), {"absorption": "sample"}, "probability", ("history", "max")),
+        ((9.0, 9.0, 1e-5), {}, "technique", ("delta", "spectral")),
+        (1.0, {}, "technique", ("delta", "decomposition")),
+        (1.0, {"transmittance": "ratio"}, "control", ("mean", "min")),
+        (1.0, {}, "majorant", ("global", "grid")),
+        ((1.0, 2.0, 3.0), {}, "probability", ("history", "max")),
+    ],
+)
+def test_what_is_said_to_have_no_use_changes_nothing_and_nothing_else_does(sigma_t, choices, family, names):
+    """Each pair of choices makes two pictures unless the second is said not to be used."""
+    (_, first), (said, second) = (said_in_fog(sigma_t, **choices, **{family: name}) for name in names)
+    unused = any(text.startswith(f"{family} {names[1]} is not used") for text in said)
+    assert np.array_equal(first, second) == unused
+
+
+def test_shadow_rays_through_homogeneous_media_are_said():
+    said, _ = said_in_fog(1.0, transmittance="ratio")
+    assert said == ["transmittance ratio: shadow rays, whose transmittance is analytic here"]
 
 
 def test_stochastic_lookups_of_a_nearest_filter_have_no_use(caplog):

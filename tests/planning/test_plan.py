@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections import Counter
 from dataclasses import FrozenInstanceError, replace
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -17,10 +18,11 @@ from clvol import layout
 from clvol.errors import OptionError
 from clvol.planning import auto, inspection, registry
 from clvol.planning.choices import Choices
+from clvol.planning.features import SAMPLED_LIGHTS, Features
 from clvol.planning.plan import Plan
-from clvol.planning.settled import FAR_APART, Settled
+from clvol.planning.settled import FAR_APART, Settled, Tuning
 from clvol.scene import boundaries
-from clvol.scene.records import ConstantEmitter, ConstVolume, DirectionalEmitter, Integrator
+from clvol.scene.records import ConstantEmitter, ConstVolume, DirectionalEmitter, Emitter, Integrator
 from clvol.tables.prepare import prepare
 
 CUBE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
@@ -101,10 +103,10 @@ def test_what_the_layout_numbers_are_the_registry_s_names():
 # -- reasons -----------------------------------------------------------------------------------------
 
 
-def glowing(**keywords):
+def glowing(albedo=0.5, **keywords):
     described = scene(**keywords)
     shape = described.shapes[0]
-    medium = replace(shape.interior, albedo=ConstVolume((0.5,)), emission=ConstVolume((1.0,)))
+    medium = replace(shape.interior, albedo=ConstVolume((albedo,)), emission=ConstVolume((1.0,)))
     return replace(described, shapes=(replace(shape, interior=medium), *described.shapes[1:]))
 
 
@@ -114,7 +116,8 @@ BESIDE = box((0.5, 0, 0), (1.5, 1, 1), homogeneous(1.0, 0.5))
 @pytest.mark.parametrize(
     ("described", "asked", "family", "name", "reason"),
     [
-        (scene(), {}, "technique", "delta", "not every medium glows in the dark"),
+        (scene(), {}, "technique", "delta", "regular would not pay: nothing emits"),
+        (glowing(albedo=0.7), {}, "technique", "delta", "emits with an albedo of at most 0.5"),
         (glowing(), {"sampler": "sobol"}, "technique", "regular", "collisions are the light"),
         (glowing(), {"sampler": "independent"}, "technique", "delta", "samples are independent"),
         (glowing(), {"lookup": "stochastic", "sampler": "sobol"}, "technique", "delta", "stochastic"),
@@ -123,7 +126,7 @@ BESIDE = box((0.5, 0, 0), (1.5, 1, 1), homogeneous(1.0, 0.5))
         (scene(), {}, "transmittance", "ratio", "lights to sample: directional"),
         (scene((SKY,)), {}, "transmittance", "none", "find a uniform sky by themselves"),
         (scene(()), {}, "transmittance", "none", "no light"),
-        (scene(), {}, "majorant", "auto", "least expected cost, once the volumes are prepared"),
+        (scene(), {}, "majorant", "auto", "by expected cost once the volumes are prepared"),
     ],
 )
 def test_every_auto_has_its_reason(described, asked, family, name, reason):
@@ -166,7 +169,7 @@ def test_a_plan_says_choices_with_reasons_stages_with_queues_and_what_is_compile
         r"technique +spectral +asked for",
         r"sampler +\w+ +auto: ",
         r"control +mean +auto: ",
-        r"features: media: 1, volumes: 1, heterogeneous",
+        r"features: media: 1; volumes: 1; heterogeneous",
         r"majorant cells: a bound of the density; residual-ratio's control \(mean\)",
         r"medium_sample +MEDIUM +SHADE",
         r"path state: \d+ bytes per slot: origin \(3\), direction \(3\), beta",
@@ -175,6 +178,27 @@ def test_a_plan_says_choices_with_reasons_stages_with_queues_and_what_is_compile
         r"\bNEE=1\b",
     ):
         assert len(re.findall(line, text)) == 1, line
+
+
+def test_a_plan_names_no_queue_that_nothing_empties_and_no_size_before_it_is_known():
+    plan = Plan.of(FOG)
+    assert re.search(r"  shade +SHADE +MEDIUM, INTERSECT, GENERATE\n", str(plan))
+    assert "GROUP_SLOTS" not in str(plan) and "BVH_STACK" not in str(plan)
+    assert "GROUP_SLOTS=512" in str(plan.tune(Tuning(64, 512)))
+    assert "ABSORPTION=MIXED" in str(plan) and "PROBABILITY" not in str(plan)
+    assert "ABSORPTION=SAMPLE" in str(Plan.of(FOG, Choices(absorption="sample")))
+
+
+def test_every_kind_of_light_counts_and_an_unknown_one_is_never_none():
+    """A kind that is added to the records has to be given a feature, and that a word."""
+    kinds = {"constant", *SAMPLED_LIGHTS}
+    for kind in get_args(Emitter):
+        assert inspection._emitter_kind(object.__new__(kind)) in kinds
+    with pytest.raises(AssertionError):
+        inspection._emitter_kind("a new lamp")
+    for features in (Features(emitters=1), Features(emitters=2, constant=True)):
+        with pytest.raises(ValueError, match="SAMPLED_LIGHTS"):
+            Plan.for_features(features, Choices())
 
 
 def test_a_choice_that_has_no_use_says_why():

@@ -15,7 +15,7 @@ from clvol.errors import OptionError
 from clvol.lab.comparison.bar import Bar
 from clvol.lab.comparison.combine import open_lineup
 from clvol.lab.comparison.figures import compute_figures
-from clvol.lab.comparison.measure import REFERENCE_SAMPLES, Measured, Plan, Told, measure
+from clvol.lab.comparison.measure import REFERENCE_SAMPLES, Effort, Measured, Told, measure
 from clvol.lab.comparison.reference import Reference, read_reference
 from clvol.lab.comparison.result import Comparison
 from clvol.lab.efficiency import LEAST_ROUNDS
@@ -100,7 +100,7 @@ def compare(
             f"compare takes a Scene, not {type(scene).__name__}", hint="make one with load_file or load_dict"
         )
     asked = names_asked(families)
-    plan = _plan(scene, time_limit, spp, rounds, reference_spp, seed)
+    effort = _effort(scene, time_limit, spp, rounds, reference_spp, seed)
     if reference is not None and reference_spp is not None:
         raise OptionError("reference_spp is for a reference that is rendered, and one is given")
     given = None if reference is None else read_reference(reference, scene)
@@ -118,10 +118,10 @@ def compare(
         labels = list(lineup.trials)
         chosen = _baseline(labels, baseline)
         measured, truth, interrupted = measure(
-            lineup, plan, given, lambda: Trial.open(opened, scene, Choices()), told
+            lineup, effort, given, lambda: Trial.open(opened, scene, Choices()), told
         )
         figures = compute_figures(measured, truth, chosen)
-    about = _about(scene, opened, plan, step, measured, truth)
+    about = _about(scene, opened, effort, step, measured, truth)
     return Comparison(figures, chosen, truth, lineup.left_out, lineup.doubles, interrupted, about)
 
 
@@ -135,14 +135,14 @@ def _silent(done: float, expected: float, text: str) -> None:
     """Progress for nobody."""
 
 
-def _plan(
+def _effort(
     scene: Scene,
     time_limit: float | None,
     spp: int | None,
     rounds: int,
     reference_spp: int | None,
     seed: int | None,
-) -> Plan:
+) -> Effort:
     """How much to render; OptionError for numbers that won't do."""
     if time_limit is not None and spp is not None:
         raise OptionError("time_limit and spp exclude each other", hint="give one of them")
@@ -159,7 +159,7 @@ def _plan(
             raise OptionError(f"{name}={value} is too few", hint=f"give at least {least[name]}")
         if value > most[name]:
             raise OptionError(f"{name}={value} is too many", hint=f"give at most {most[name]}")
-    return Plan(rounds, time_limit or DEFAULT_SECONDS, spp, reference_spp, seed)
+    return Effort(rounds, time_limit or DEFAULT_SECONDS, spp, reference_spp, seed)
 
 
 def _baseline(labels: list[str], wanted: str | None) -> str:
@@ -171,7 +171,12 @@ def _baseline(labels: list[str], wanted: str | None) -> str:
 
 
 def _about(
-    scene: Scene, device: Device, plan: Plan, step: float | None, measured: list[Measured], truth: Reference
+    scene: Scene,
+    device: Device,
+    effort: Effort,
+    step: float | None,
+    measured: list[Measured],
+    truth: Reference,
 ) -> dict[str, object]:
     """How the comparison was made."""
     return {
@@ -180,10 +185,10 @@ def _about(
         "width": truth.image.shape[1],
         "height": truth.image.shape[0],
         "rounds": len(measured[0].seconds),
-        "rounds_planned": plan.rounds,
-        "seconds_planned": plan.seconds if plan.spp is None else None,
+        "rounds_planned": effort.rounds,
+        "seconds_planned": effort.seconds if effort.spp is None else None,
         "step_of_marching": step,
-        "seed": plan.seed,
+        "seed": effort.seed,
         "reference": truth.source,
         "device": device.description,
         "clvol": __version__,

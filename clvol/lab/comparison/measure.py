@@ -35,7 +35,7 @@ Told = Callable[[float, float, str], None]
 
 
 @dataclass(frozen=True)
-class Plan:
+class Effort:
     """How much to render.
 
     Parameters
@@ -148,7 +148,7 @@ def _noted(notes: dict[str, str]) -> Iterator[None]:
 
 
 def measure(
-    lineup: Lineup, plan: Plan, given: Reference | None, spare: Callable[[], Trial], told: Told
+    lineup: Lineup, effort: Effort, given: Reference | None, spare: Callable[[], Trial], told: Told
 ) -> tuple[list[Measured], Reference, bool]:
     """Render all rounds: the combinations, the reference, and whether Ctrl-C ended them early.
 
@@ -158,11 +158,11 @@ def measure(
     clock = _Clock(told)
     taken = given.seeds if given else None
     # How many trials there are depends on the machine's pace; the rounds' seeds do not.
-    seeds, trial_seeds = seeds_from(plan.seed, taken), seeds_from((plan.seed + 2**63) % 2**64, taken)
+    seeds, trial_seeds = seeds_from(effort.seed, taken), seeds_from((effort.seed + 2**63) % 2**64, taken)
     entrants = [_Entrant(label, trial, clock.tick) for label, trial in lineup.trials.items()]
     for entrant in entrants:
-        entrant.try_out(trial_seeds, plan.spp)
-        entrant.spp = plan.spp or _samples(plan.seconds / plan.rounds / max(entrant.pace, 1e-9), lineup)
+        entrant.try_out(trial_seeds, effort.spp)
+        entrant.spp = effort.spp or _samples(effort.seconds / effort.rounds / max(entrant.pace, 1e-9), lineup)
     shorter = [
         (e, spp, replace(e, spp=spp, label=f"{e.label}, {spp} spp"))
         for e in entrants
@@ -170,9 +170,9 @@ def measure(
     ]
     running = [*entrants, *(short for *_, short in shorter)]
     if given is None:
-        running.append(_reference_entrant(entrants, lineup, plan, spare, trial_seeds, clock))
-    clock.expect({e.label: e.pace * e.spp for e in running}, plan.rounds)
-    done, interrupted = _rounds(running, plan.rounds, seeds)
+        running.append(_reference_entrant(entrants, lineup, effort, spare, trial_seeds, clock))
+    clock.expect({e.label: e.pace * e.spp for e in running}, effort.rounds)
+    done, interrupted = _rounds(running, effort.rounds, seeds)
     columns = list(zip(*done, strict=True))
     measured = [_measured(e, column) for e, column in zip(entrants, columns, strict=False)]
     for (entrant, spp, _), column in zip(shorter, columns[len(entrants) :], strict=False):
@@ -225,7 +225,7 @@ def uses_sobol(trial: Trial) -> bool:
 def _reference_entrant(
     entrants: list[_Entrant],
     lineup: Lineup,
-    plan: Plan,
+    effort: Effort,
     spare: Callable[[], Trial],
     trial_seeds: Iterator[int],
     clock: _Clock,
@@ -234,12 +234,12 @@ def _reference_entrant(
     unbiased = [e for e in entrants if not e.trial.biased]
     if not unbiased:
         unbiased = [_Entrant("auto", spare(), clock.tick)]
-        unbiased[0].try_out(trial_seeds, plan.spp)
-        unbiased[0].spp = plan.spp or _samples(plan.seconds / plan.rounds / unbiased[0].pace, lineup)
+        unbiased[0].try_out(trial_seeds, effort.spp)
+        unbiased[0].spp = effort.spp or _samples(effort.seconds / effort.rounds / unbiased[0].pace, lineup)
     best = min(unbiased, key=lambda e: e.variance * e.pace)
     spp = _samples(REFERENCE_SAMPLES * best.spp, lineup)
-    if plan.reference_spp is not None:
-        spp = math.ceil(plan.reference_spp / plan.rounds)
+    if effort.reference_spp is not None:
+        spp = math.ceil(effort.reference_spp / effort.rounds)
     return _Entrant("reference", best.trial, clock.tick, best.notes, spp, best.pace, best.variance)
 
 
