@@ -119,7 +119,7 @@ def test_a_majorant_ten_percent_too_low_is_caught_by_count_and_by_picture(majora
         bounds = with_slack(minimum, maximum, cell_size, mean)
         return replace(bounds, maximum=bounds.maximum * np.float32(0.9))
 
-    monkeypatch.setattr("clvol.tables.prepare.with_slack", lowered)
+    monkeypatch.setattr("clvol.tables.majorants.with_slack", lowered)
     scene = cloud(SKY_AND_SUN)
     broken = render(scene, spp=2048, seed=6, majorant=majorant, transmittance="ratio", absorption="mixed")
     assert broken.stats["majorant_violations"] > 0.01 * broken.stats["lookups"]
