@@ -129,7 +129,7 @@ def render(
     if piloted:
         with bar as callback:
             choices, found, options = _piloted(opened, scene, choices, seed, count, time_limit, callback)
-        planned = planned.having(choices)
+        planned = planned.having(choices, dict.fromkeys(found.names, "chosen by the pilot"))
     session = Session.for_plan(opened, scene, planned, seed, pool, spent)
     session.describe()
     session.warn(asked)

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from clvol.planning.features import Features
 
 DEFAULT_SAMPLER = "sobol"
+OWN = "the scene's own"
+"""The reason of a name that the scene's integrator gives."""
 UNSETTLED = "auto"
 """The majorant of a plan until the volumes are prepared, which show what each kind would cost."""
 
@@ -46,7 +48,7 @@ def resolve(
         names[family], reasons[family] = rule[0], f"auto: {rule[1]}"
         if asked[family] != "auto":
             names[family] = asked[family]
-            reasons[family] = "the scene's own" if (own or {}).get(family) == asked[family] else "asked for"
+            reasons[family] = OWN if (own or {}).get(family) == asked[family] else "asked for"
     if not features.heterogeneous:
         names["majorant"] = "none"
     return Names(names), Names(reasons)

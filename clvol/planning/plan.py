@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from clvol import layout
-from clvol.planning.auto import resolve
+from clvol.planning.auto import OWN, resolve
 from clvol.planning.choices import Choices
 from clvol.planning.compiled import filled_slots, plan_macros
 from clvol.planning.decisions import Decisions
@@ -60,9 +60,14 @@ class Plan(Decisions):
         refuse_impossible(features, choices, chosen)
         return cls(features, choices, chosen, reasons, boundaries)
 
-    def having(self, choices: Choices) -> Plan:
-        """The plan of the same scene with other choices; OptionError for what cannot be right."""
-        return self.for_features(self.features, choices, self.boundaries)
+    def having(self, choices: Choices, reasons: Mapping[str, str] = MappingProxyType({})) -> Plan:
+        """The plan of the same scene with other choices; OptionError for what cannot be right.
+
+        reasons : why, by family, where it is not that they were asked for.
+        """
+        own = {family: self.chosen[family] for family, reason in self.reasons.items() if reason == OWN}
+        plan = self.for_features(self.features, choices, self.boundaries, own)
+        return replace(plan, reasons=plan.reasons.but(**reasons))
 
     def settle(self, settled: Settled) -> Plan:
         """With what the volumes show."""

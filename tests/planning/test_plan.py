@@ -143,6 +143,15 @@ def test_what_is_asked_for_and_what_the_scene_says_are_told_apart():
     assert all(reasons[family].startswith("auto: ") for family in others)
 
 
+def test_other_choices_keep_the_scene_s_own_and_say_who_made_them():
+    own = replace(FOG, integrator=Integrator(choices={"sampler": "independent"}))
+    plan = Plan.of(own, Choices.for_scene(own, {}))
+    other = plan.having(plan.choices.but(technique="spectral"), {"technique": "chosen by the pilot"})
+    assert other.reasons["sampler"] == plan.reasons["sampler"] == "the scene's own"
+    assert other.reasons["technique"] == "chosen by the pilot"
+    assert plan.having(plan.choices.but(sampler="sobol")).reasons["sampler"] == "asked for"
+
+
 def test_the_volumes_settle_the_majorant_with_the_costs_of_all():
     plan = prepare(scene(), Plan.of(scene())).plan
     assert plan.chosen["majorant"] in registry.MAJORANTS and plan.settled.majorant == plan.chosen["majorant"]
