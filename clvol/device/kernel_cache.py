@@ -1,7 +1,8 @@
 """The folder in which PoCL keeps built kernels: one that it can write, and nothing in it that is cut short.
 
 PoCL loads what it finds there unchecked, and ends the process where the disk is full, the folder cannot be
-written or a file was cut short by a power failure: nothing that could be caught.  So this looks before.
+written or a file was cut short by a power failure: nothing that could be caught.  So this looks before: at
+everything once since the machine was started, then at what is new.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import sqlite3
 import struct
 import sys
 import tempfile
+import time
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -30,6 +32,11 @@ VARIABLE = "POCL_CACHE_DIR"
 _HINT = f"let the variable {VARIABLE} name a folder that can be written"
 ROOM = 16 << 20
 """Bytes that must be free: a scene's kernels take one or two million."""
+STAMP = "clvol-checked"
+"""A file in the folder.  It holds the start of the machine in which all programs older than it were whole."""
+_BOOT = Path("/proc/sys/kernel/random/boot_id")
+_CLOCKS = 10.0
+"""Seconds by which the clocks of file systems may differ from this machine's."""
 
 # A program's folder is named by the half bytes of a hash as letters, the first two a folder of their own.
 _PAIR, _REST = re.compile("[A-P]{2}"), re.compile("[A-P]{30,}")
@@ -142,11 +149,46 @@ def check(folder: KernelFolder) -> None:
 
 
 def remove_broken(folder: Path) -> int:
-    """Remove the programs in PoCL's cache of which a file is not whole; how many there were."""
-    broken = [program for program in _programs(folder) if not _is_program_whole(program)]
+    """Remove the programs in PoCL's cache of which a file is not whole; how many there were.
+
+    PoCL renames files that are finished, so that only a loss of power cuts them short.  What was whole since
+    the machine was started is not looked at again: a cache may hold thousands of programs.
+    """
+    began, boot = time.time() - _CLOCKS, _boot()
+    since = _checked(folder, boot)
+    programs = list(_programs(folder, since))
+    broken = [program for program in programs if not _is_program_whole(program)]
     for program in broken:
         shutil.rmtree(program, ignore_errors=True)
+    if boot and (programs or since == 0):
+        _stamp(folder, boot, began)
     return len(broken)
+
+
+def _boot() -> str:
+    """Names this start of the machine; "" where the system does not tell."""
+    try:
+        return _BOOT.read_text().strip()
+    except OSError:
+        return ""
+
+
+def _checked(folder: Path, boot: str) -> float:
+    """When the folder was looked at since the machine was started; 0 for never."""
+    try:
+        stamp = folder / STAMP
+        return stamp.stat().st_mtime if boot and stamp.read_text() == boot else 0.0
+    except (OSError, ValueError):
+        return 0.0
+
+
+def _stamp(folder: Path, boot: str, when: float) -> None:
+    """Note that everything older than `when` is whole; nothing where it cannot be written."""
+    try:
+        (folder / STAMP).write_text(boot)
+        os.utime(folder / STAMP, (when, when))
+    except OSError as error:
+        log.debug("%s cannot be stamped: %s", folder, error)
 
 
 def _is_program_whole(program: str) -> bool:
@@ -156,15 +198,16 @@ def _is_program_whole(program: str) -> bool:
         return True
 
 
-def _programs(folder: Path) -> Iterator[str]:
-    """The folder of each program in the cache; of nothing else that may lie there."""
-    for pair in _folders(folder, _PAIR):
-        yield from _folders(pair, _REST)
+def _programs(folder: Path, since: float) -> Iterator[str]:
+    """The folder of each program in the cache that is as new as `since`, and of nothing else there."""
+    for pair in _folders(folder, _PAIR, since):
+        yield from _folders(pair, _REST, since)
 
 
-def _folders(parent: Path | str, name: re.Pattern[str]) -> list[str]:
+def _folders(parent: Path | str, name: re.Pattern[str], since: float) -> list[str]:
     try:
-        return [entry.path for entry in os.scandir(parent) if name.fullmatch(entry.name) and entry.is_dir()]
+        found = [entry for entry in os.scandir(parent) if name.fullmatch(entry.name) and entry.is_dir()]
+        return [entry.path for entry in found if since == 0 or entry.stat().st_mtime >= since]
     except OSError:  # gone in the meantime, or not ours to read
         return []
 

@@ -6,8 +6,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from clvol.scene.mesh import merged_vertices
 
@@ -77,6 +75,9 @@ class _Nesting:
 
 def _parts(corners: np.ndarray) -> tuple[int, np.ndarray]:
     """How many parts there are, and the part of each triangle."""
+    from scipy.sparse import coo_array  # takes longer to import than most scenes to prepare
+    from scipy.sparse.csgraph import connected_components
+
     size = int(corners.max()) + 1
     a, b, c = corners.T
     rows, columns = np.concatenate([a, b]), np.concatenate([b, c])

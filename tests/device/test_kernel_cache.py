@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ import pytest
 import clvol
 from clvol.device import kernel_cache
 from clvol.device.device import open_device
-from clvol.device.kernel_cache import KernelFolder, is_whole, remove_broken, unusable
+from clvol.device.kernel_cache import STAMP, KernelFolder, is_whole, remove_broken, unusable
 from clvol.errors import DeviceError
 
 SCENE = """<scene version="3.0.0"><sensor type="perspective"><film type="hdrfilm">
@@ -83,9 +84,34 @@ def test_a_cache_file_cut_short_is_built_anew(built, tmp_path, kind, cut):
     shutil.copytree(built, cache)
     for file in cache.rglob(kind):
         file.write_bytes(cut(file.read_bytes()))
+    (cache / STAMP).write_text("the machine was started since")
     first = render(tmp_path, POCL_CACHE_DIR=str(cache))
     assert (first.returncode, first.stderr.count("cut short")) == (0, 1), first.stderr
     assert all(is_whole(str(file)) for file in cache.rglob("*.so"))
+
+
+def test_programs_are_looked_at_once_since_the_machine_was_started(built, tmp_path, monkeypatch):
+    """A cache of thousands takes seconds."""
+    cache, looked_at = tmp_path / "cache", []
+    shutil.copytree(built, cache)
+    monkeypatch.setattr(kernel_cache, "is_whole", lambda path: not looked_at.append(path))
+    (cache / STAMP).unlink()
+    assert remove_broken(cache) == 0
+    count = len(looked_at)
+    assert count >= 2 * len(list(cache.rglob("program.bc"))) > 0
+    os.utime(cache / STAMP, (time.time() + 60,) * 2)  # after everything in it
+    assert remove_broken(cache) == 0
+    assert len(looked_at) == count
+    new = next(cache.rglob("program.bc")).parent
+    shutil.copytree(new, new.with_name("A" * 36))
+    later = time.time() + 90
+    for folder in (new.parent, new.with_name("A" * 36)):
+        os.utime(folder, (later, later))
+    assert remove_broken(cache) == 0
+    assert {Path(path).name for path in looked_at[count:]} == {f.name for f in new.rglob("*.[bs][co]")}
+    monkeypatch.setattr(kernel_cache, "_boot", lambda: "")
+    assert remove_broken(cache) == 0
+    assert len(looked_at) > 2 * count, "a system that does not tell when it was started"
 
 
 def test_only_programs_are_looked_at(built, tmp_path):
