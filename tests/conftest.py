@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+os.environ.setdefault("CLVOL_BUILD_PROCESSES", "1")  # the tests' own processes use every core
+
 OTHERS = {
     "mitsuba": ("Mitsuba 3.9", "CLVOL_MITSUBA"),
     "openvdb": ("OpenVDB 12", "CLVOL_OPENVDB"),

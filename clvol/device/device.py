@@ -53,6 +53,11 @@ class Device:
         return self.info.kind == "CPU"
 
     @property
+    def is_pocl(self) -> bool:
+        """Whether PoCL runs it, on the processor."""
+        return self.is_cpu and _POCL in self.info.platform
+
+    @property
     def description(self) -> str:
         """Name and platform, as users see them."""
         return f"{self.info.name} ({self.info.platform})"

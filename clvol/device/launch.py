@@ -49,8 +49,12 @@ def scene_arguments(
 
 def launch(device: Device, kernel: cl.Kernel, count: int, group: int = GROUP) -> cl.Event:
     """Queue a kernel for `count` work-items or, where they do not fill the last group, a few more."""
-    size = -(-count // group) * group
-    return cl.enqueue_nd_range_kernel(device.queue, kernel, (size,), (group,))
+    return cl.enqueue_nd_range_kernel(device.queue, kernel, (whole(count, group),), (group,))
+
+
+def whole(count: int, group: int = GROUP) -> int:
+    """Work-items that a launch for `count` has: those of whole groups."""
+    return -(-count // group) * group
 
 
 def run_kernel(

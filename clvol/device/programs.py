@@ -16,13 +16,16 @@ from typing import TYPE_CHECKING
 import pyopencl as cl
 
 from clvol import layout
+from clvol.device.launch import GROUP, whole
 from clvol.device.preprocess import Preprocessor
+from clvol.device.side_builds import Unit
 from clvol.errors import DeviceError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from clvol.device.device import Device
+    from clvol.device.side_builds import SideBuilds
     from clvol.layout.stages import Stage
     from clvol.planning.plan import Plan
 
@@ -110,9 +113,23 @@ def build(device: Device, source: str, name: str) -> cl.Program:
         raise DeviceError(f"kernel {name!r} does not build on {device.description}:\n{log}") from error
 
 
-def build_stages(device: Device, plan: Plan) -> dict[str, cl.Kernel]:
-    """One kernel object per stage of `plan`, and `accumulate`."""
-    names = (*plan.stages, "accumulate")
+def stage_units(plan: Plan, groups: int, pixels: int) -> dict[str, Unit]:
+    """What is built for a plan: each stage, and `accumulate`, for so many groups and pixels."""
+    local = plan.tuning.local_size
+    launches = dict.fromkeys(plan.stages, (groups * local, local)) | {"accumulate": (whole(pixels), GROUP)}
     return {
-        name: cl.Kernel(build(device, stage_source(plan, name), name), f"{name}_kernel") for name in names
+        name: Unit(stage_source(plan, name), BUILD_OPTIONS, f"{name}_kernel", *launch)
+        for name, launch in launches.items()
     }
+
+
+def build_stages(
+    device: Device, units: Mapping[str, Unit], builds: SideBuilds | None = None
+) -> dict[str, cl.Kernel]:
+    """One kernel object per unit, each once `builds` is through with it."""
+    kernels = {}
+    for name, unit in units.items():
+        if builds:
+            builds.wait(unit)
+        kernels[name] = cl.Kernel(build(device, unit.source, name), unit.name)
+    return kernels

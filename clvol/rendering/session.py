@@ -12,7 +12,8 @@ import numpy as np
 from clvol import layout
 from clvol.base.arguments import check_seed
 from clvol.base.progress import FilmNoise, Progress, ProgressCallback
-from clvol.device.programs import build_stages
+from clvol.device.programs import build_stages, stage_units
+from clvol.device.side_builds import SideBuilds
 from clvol.errors import RenderError
 from clvol.picture.result import relative_noise
 from clvol.planning.in_force import warnings
@@ -89,15 +90,22 @@ class Session:
         started = time.perf_counter()
         prepared = on_device(prepared, device)
         plan = prepared.plan
-        kernels = build_stages(device, plan)
-        built = time.perf_counter()
-        buffers = upload_scene(device, prepared)
         record = render_record(prepared, seed)
-        wavefront = Wavefront(device, plan, kernels, buffers, record, Pool.for_device(device, plan, pool))
-        warming = time.perf_counter()
-        wavefront.warm_up()
+        slots = Pool.for_device(device, plan, pool)
+        groups, pixels = slots.slots // plan.tuning.group_slots, int(np.prod(record["film_size"]))
+        units = stage_units(plan, groups, pixels)
+        with SideBuilds(device, units.values()) as builds:
+            uploading = time.perf_counter()
+            buffers = upload_scene(device, prepared)
+            uploaded = time.perf_counter()
+            kernels = build_stages(device, units, builds)
+            built = time.perf_counter()
+            wavefront = Wavefront(device, plan, kernels, buffers, record, slots)
+            warming = time.perf_counter()
+            wavefront.warm_up()
+            builds.remember()
         ready = time.perf_counter()
-        kernel_seconds = built - started + ready - warming
+        kernel_seconds = uploading - started + built - uploaded + ready - warming
         return cls(device, prepared, wavefront, seed, ready - started, kernel_seconds)
 
     @property
