@@ -44,11 +44,11 @@ INLINE uint mixed_bits(uint x)
 /* Number `index` of the sequence, bits reversed. */
 INLINE uint4 sobol_point(const Scene *scene, uint index)
 {
-    __global const uint *digits = scene->sobol;
+    __global const uint4 *digits = (__global const uint4 *)scene->sobol; /* aligned, as every buffer's start is */
     uint4 point = (uint4)(0u);
 #pragma unroll 1 /* few turns; unrolled it would take a third of all build time */
-    for (; index > 0; index >>= 4, digits += 16 * 4)
-        point ^= vload4(index & 15u, digits);
+    for (; index > 0; index >>= 4, digits += 16)
+        point ^= digits[index & 15u]; /* vload4 is a call on PoCL */
     return point;
 }
 

@@ -23,9 +23,21 @@ INLINE __global uint *idle_slots(const Scene *scene, uint group)
     return scene->queue_lengths + group * QUEUE_LENGTHS_STRIDE + QUEUE_COUNT;
 }
 
+/* Adds to a count of the group's own, and returns what it was.  A group of one work-item shares it with nobody. */
+INLINE uint group_add(__global uint *count, uint more)
+{
+#if CLVOL_LOCAL_SIZE == 1
+    const uint before = *count;
+    *count = before + more;
+    return before;
+#else
+    return atomic_add(count, more);
+#endif
+}
+
 INLINE void queue_push(const Scene *scene, uint group, uint queue, uint slot)
 {
-    const uint place = atomic_inc(queue_length(scene, group, queue));
+    const uint place = group_add(queue_length(scene, group, queue), 1);
     queue_entries(scene, group, queue)[place] = slot;
 }
 
