@@ -16,7 +16,7 @@ INLINE Fresnel fresnel_dielectric(float cos_i, float ior)
     result.eta = cos_i >= 0.0f ? ior : 1.0f / ior;
     const float inverse = cos_i >= 0.0f ? 1.0f / ior : ior;
     const float c = abs_of(cos_i);
-    const float t = sqrt(max_of(1.0f - (1.0f - c * c) * inverse * inverse, 0.0f));
+    const float t = sqrt_of(max_of(1.0f - (1.0f - c * c) * inverse * inverse, 0.0f));
     const float s = (c - result.eta * t) / (c + result.eta * t);
     const float p = (t - result.eta * c) / (t + result.eta * c);
     result.cos_t = cos_i >= 0.0f ? -t : t;
@@ -32,17 +32,17 @@ INLINE float thin_reflectance(float cos_i, float ior)
     return 2.0f * r / (1.0f + r);
 }
 
-/* Metal of complex index eta - i k, with a + i b = sqrt((eta - i k)² - sin²) (Born and Wolf, §14.4).  a² is the
+/* Metal of complex index eta - i k, with a + i b = sqrt_of((eta - i k)² - sin²) (Born and Wolf, §14.4).  a² is the
    difference of almost equal numbers where the metal absorbs much, and exactly 0 for eta = 0: it is taken from the
    product a b = eta k there. */
 INLINE float fresnel_conductor(float cos_i, float eta, float k)
 {
     const float cos2 = cos_i * cos_i, sin2 = 1.0f - cos2;
     const float real = eta * eta - k * k - sin2, imaginary = 2.0f * eta * k;
-    const float modulus = sqrt(real * real + imaginary * imaginary);
+    const float modulus = sqrt_of(real * real + imaginary * imaginary);
     const float a2 = real > 0.0f ? 0.5f * (modulus + real)
                                  : 0.5f * imaginary * imaginary / max_of(modulus - real, 1e-30f);
-    const float x = modulus + cos2, y = 2.0f * cos_i * sqrt(a2);
+    const float x = modulus + cos2, y = 2.0f * cos_i * sqrt_of(a2);
     const float s = (x - y) / max_of(x + y, 1e-30f);
     const float z = modulus * cos2 + sin2 * sin2, w = y * sin2;
     const float p = s * (z - w) / max_of(z + w, 1e-30f);

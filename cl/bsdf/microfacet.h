@@ -26,10 +26,10 @@ INLINE float microfacet_density(__global const Material *material, float3 m)
 INLINE float stretched_sine(__global const Material *material, float3 w)
 {
     const float x = material->alpha_u * w.x, y = material->alpha_v * w.y;
-    return sqrt(x * x + y * y);
+    return sqrt_of(x * x + y * y);
 }
 
-INLINE float ggx_over_cos(float c, float s) { return 2.0f / (c + sqrt(c * c + s * s)); }
+INLINE float ggx_over_cos(float c, float s) { return 2.0f / (c + sqrt_of(c * c + s * s)); }
 
 /* G1(w) / |cos theta| of the model's values. */
 INLINE float shadowing_over_cos(__global const Material *material, float3 w)
@@ -77,7 +77,7 @@ INLINE float erf_inverse(float x)
         p = p * w + 2.46640727e-01f;
         p = p * w + 1.50140941f;
     } else {
-        w = sqrt(w) - 3.0f;
+        w = sqrt_of(w) - 3.0f;
         p = 1.00950558e-04f - 2.00214257e-04f * w;
         p = p * w + 1.34934322e-03f;
         p = p * w - 3.67342844e-03f;
@@ -100,7 +100,7 @@ INLINE float beckmann_slope(float c, float s, float u)
     const float last = erf(cot);
     const float total = c * (1.0f + last) + s * inv_sqrt_pi * exp(-cot * cot);
     float low = -1.0f, high = last;
-    float x = last - (last + 1.0f) * erf(sqrt(-log(max_of(u, 1e-30f))));
+    float x = last - (last + 1.0f) * erf(sqrt_of(-log(max_of(u, 1e-30f))));
     float slope = 0.0f;
     for (int step = 0; step < 12; ++step) {
         if (!(x >= low && x <= high))
@@ -118,7 +118,7 @@ INLINE float beckmann_slope(float c, float s, float u)
 
 INLINE float3 beckmann_normal(__global const Material *material, float3 w, float u, float v)
 {
-    const float r2 = w.x * w.x + w.y * w.y, r = sqrt(r2);
+    const float r2 = w.x * w.x + w.y * w.y, r = sqrt_of(r2);
     const float cos_phi = r > 0.0f ? w.x / r : 1.0f, sin_phi = r > 0.0f ? w.y / r : 0.0f;
     const float x = beckmann_slope(w.z, r, u), y = erf_inverse(2.0f * v - 1.0f);
     return (float3)(-material->alpha_u * (cos_phi * x - sin_phi * y), -material->alpha_v * (sin_phi * x + cos_phi * y),
@@ -129,7 +129,7 @@ INLINE float3 beckmann_normal(__global const Material *material, float3 w, float
 INLINE float3 ggx_normal(__global const Material *material, float3 w, float u, float v)
 {
     const float h = (1.0f - v) * (1.0f + w.z), z = h - w.z;
-    const float r = sqrt(max_of(1.0f - z * z, 0.0f));
+    const float r = sqrt_of(max_of(1.0f - z * z, 0.0f));
     const float2 turn = cos_sin_turn(u);
     return (float3)(material->alpha_u * (r * turn.x + w.x), material->alpha_v * (r * turn.y + w.y), h);
 }
@@ -137,10 +137,10 @@ INLINE float3 ggx_normal(__global const Material *material, float3 w, float u, f
 /* A normal m, m.z > 0, of density D(m) G1(w) (w·m)+ / cos theta; w.z > 0. */
 INLINE float3 sample_visible_normal(__global const Material *material, float3 w, float u, float v)
 {
-    const float3 stretched = normalize((float3)(material->alpha_u * w.x, material->alpha_v * w.y, w.z));
+    const float3 stretched = unit_of((float3)(material->alpha_u * w.x, material->alpha_v * w.y, w.z));
     const float3 m = material->distribution == DISTRIBUTION_GGX ? ggx_normal(material, stretched, u, v)
                                                                 : beckmann_normal(material, stretched, u, v);
-    return normalize((float3)(m.x, m.y, max_of(m.z, 1e-12f)));
+    return unit_of((float3)(m.x, m.y, max_of(m.z, 1e-12f)));
 }
 
 #endif

@@ -12,7 +12,7 @@ INLINE bool rough_conductor_sample(const Scene *scene, __global const Material *
     if (wi.z <= 0.0f)
         return false;
     const float3 m = sample_visible_normal(material, wi, u, v);
-    const float cos_m = dot(wi, m);
+    const float cos_m = dot_of(wi, m);
     const float3 wo = 2.0f * cos_m * m - wi;
     if (wo.z <= 0.0f || cos_m <= 0.0f)
         return false;
@@ -34,7 +34,7 @@ INLINE Spectrum rough_conductor_value(const Scene *scene, __global const Materia
     *pdf = density * visibility_over_cos(material, wi);
     const float value = density * shadowing_over_cos(material, wi) * shadowing(material, wo);
     return value * specular_reflectance(scene, material, uv, channel) *
-           conductor_reflectance(material, dot(wi, m), channel);
+           conductor_reflectance(material, dot_of(wi, m), channel);
 }
 
 #endif

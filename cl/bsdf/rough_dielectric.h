@@ -12,7 +12,7 @@
 INLINE float2 facet_value(__global const Material *material, float3 wi, float3 wo, float3 m, Fresnel fresnel,
                           bool reflects)
 {
-    const float cos_i = dot(wi, m), cos_o = dot(wo, m);
+    const float cos_i = dot_of(wi, m), cos_o = dot_of(wo, m);
     if (cos_i * wi.z <= 0.0f || cos_o * wo.z <= 0.0f)
         return (float2)(0.0f);
     const float density = microfacet_density(material, m);
@@ -33,7 +33,7 @@ INLINE bool rough_dielectric_sample(const Scene *scene, __global const Material 
     if (material->ior == 1.0f) /* a boundary of nothing: the lobe of refraction is a delta */
         return delta_sample(sample, -wi, specular_transmittance(scene, material, uv, channel), 1.0f);
     const float3 m = sample_visible_normal(material, wi.z > 0.0f ? wi : -wi, u, v);
-    const float cos_m = dot(wi, m);
+    const float cos_m = dot_of(wi, m);
     const Fresnel fresnel = fresnel_dielectric(cos_m, material->ior);
     const bool reflects = happens(pick, fresnel.reflectance);
     const float inverse = 1.0f / fresnel.eta;
@@ -54,11 +54,11 @@ INLINE Spectrum rough_dielectric_value(const Scene *scene, __global const Materi
     const bool reflects = wi.z * wo.z > 0.0f;
     const float eta = wi.z > 0.0f ? material->ior : 1.0f / material->ior;
     float3 m = wi + (reflects ? 1.0f : eta) * wo;
-    const float square = dot(m, m);
+    const float square = dot_of(m, m);
     if (wi.z * wo.z == 0.0f || material->ior == 1.0f || square == 0.0f)
         return (Spectrum)(0.0f);
-    m *= with_sign(1.0f / sqrt(square), m.z);
-    const Fresnel fresnel = fresnel_dielectric(dot(wi, m), material->ior);
+    m *= with_sign(1.0f / sqrt_of(square), m.z);
+    const Fresnel fresnel = fresnel_dielectric(dot_of(wi, m), material->ior);
     const float2 found = facet_value(material, wi, wo, m, fresnel, reflects);
     *pdf = found.y;
     return found.x * (reflects ? specular_reflectance(scene, material, uv, channel)

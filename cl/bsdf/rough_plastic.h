@@ -28,7 +28,7 @@ INLINE Spectrum rough_plastic_value(const Scene *scene, __global const Material 
     const float3 m = normalize(wi + wo);
     const float density = 0.25f * microfacet_density(material, m);
     const float coat = density * shadowing_over_cos(material, wi) * shadowing(material, wo) *
-                       fresnel_dielectric(dot(wi, m), material->ior).reflectance;
+                       fresnel_dielectric(dot_of(wi, m), material->ior).reflectance;
     const float probability = coat_probability(material, 1.0f - in);
     *pdf = lerp(INV_PI * wo.z, density * visibility_over_cos(material, wi), probability);
     return coat * specular_reflectance(scene, material, uv, channel) +
@@ -43,7 +43,7 @@ INLINE bool rough_plastic_sample(const Scene *scene, __global const Material *ma
     float3 wo = cosine_direction(u, v);
     if (happens(pick, coat_probability(material, 1.0f - coat_transmittance(scene, material, wi.z)))) {
         const float3 m = sample_visible_normal(material, wi, u, v);
-        wo = 2.0f * dot(wi, m) * m - wi;
+        wo = 2.0f * dot_of(wi, m) * m - wi;
     }
     float pdf;
     const Spectrum value = rough_plastic_value(scene, material, uv, wi, wo, channel, &pdf);

@@ -25,9 +25,9 @@ INLINE float3 mirrored(float3 wi) { return (float3)(-wi.x, -wi.y, wi.z); }
 /* Direction of density cos theta / pi; never along the horizon, where its pdf would be that of a delta lobe. */
 INLINE float3 cosine_direction(float u, float v)
 {
-    const float r = sqrt(u);
+    const float r = sqrt_of(u);
     const float2 turn = cos_sin_turn(v);
-    return (float3)(r * turn.x, r * turn.y, sqrt(max_of(1.0f - u, 0x1p-25f)));
+    return (float3)(r * turn.x, r * turn.y, sqrt_of(max_of(1.0f - u, 0x1p-25f)));
 }
 
 INLINE bool delta_sample(BsdfSample *sample, float3 direction, Spectrum weight, float eta)

@@ -80,7 +80,7 @@ INLINE float exponential_variate(uint k)
     const float tail = (float)(lower_half ? k : ~k) * 0x1p-32f + 0x1p-33f; /* distance to the nearer end */
     const bool near_one = lower_half && tail < 0.29f;
     const uint bits = as_uint(lower_half ? 1.0f - tail : tail);
-    const uint shifted = bits - 0x3F3504F3u; /* mantissa into [sqrt(1/2), sqrt(2)) */
+    const uint shifted = bits - 0x3F3504F3u; /* mantissa into [sqrt_of(1/2), sqrt_of(2)) */
     const float exponent = near_one ? 0.0f : (float)((int)shifted >> 23);
     const float r = near_one ? -tail : as_float((shifted & 0x007FFFFFu) + 0x3F3504F3u) - 1.0f;
     float poly = 7.0376836292e-2f;

@@ -15,7 +15,7 @@ INLINE float3 to_frame(float3 n, float x, float y, float z)
 
 INLINE float3 sphere_direction(float u, float v)
 {
-    const float r = 2.0f * sqrt(u * (1.0f - u));
+    const float r = 2.0f * sqrt_of(u * (1.0f - u));
     const float2 turn = cos_sin_turn(v);
     return (float3)(r * turn.x, r * turn.y, 1.0f - 2.0f * u);
 }

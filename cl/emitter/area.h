@@ -27,11 +27,11 @@ INLINE bool sphere_cone(__global const Shape *shape, float3 from, SphereCone *co
 {
     __global const float *m = shape->world_from_local;
     const float3 to = (float3)(m[3], m[7], m[11]) - from;
-    const float radius = sqrt(m[0] * m[0] + m[4] * m[4] + m[8] * m[8]), distance = sqrt(dot(to, to));
+    const float radius = sqrt_of(m[0] * m[0] + m[4] * m[4] + m[8] * m[8]), distance = sqrt_of(dot_of(to, to));
     if (shape->flip || !(distance > radius))
         return false;
     const float sine = radius / distance;
-    const float cosine = sqrt((distance - radius) * (distance + radius)) / distance;
+    const float cosine = sqrt_of((distance - radius) * (distance + radius)) / distance;
     cone->axis = to / distance;
     cone->distance = distance;
     cone->radius = radius;
@@ -45,10 +45,10 @@ INLINE float cone_pdf(const SphereCone *cone) { return 1.0f / (2.0f * PI * cone-
 INLINE float3 cone_direction(const SphereCone *cone, float u, float v, float *distance)
 {
     const float h = u * cone->one_minus_cos; /* 1 - cos of the angle to the axis */
-    const float sine = sqrt(h * (2.0f - h)), cosine = 1.0f - h;
+    const float sine = sqrt_of(h * (2.0f - h)), cosine = 1.0f - h;
     const float2 turn = cos_sin_turn(v);
     const float miss = cone->distance * sine; /* how close the line comes to the centre */
-    const float half_chord = sqrt(max_of((cone->radius - miss) * (cone->radius + miss), 0.0f));
+    const float half_chord = sqrt_of(max_of((cone->radius - miss) * (cone->radius + miss), 0.0f));
     /* the smaller root of the quadratic, without the difference of near and equal numbers */
     *distance = (cone->distance - cone->radius) * (cone->distance + cone->radius) /
                 (cone->distance * cosine + half_chord);
@@ -60,7 +60,7 @@ INLINE float3 mesh_point(const Scene *scene, __global const Emitter *emitter, fl
                          uint *primitive)
 {
     const int entry = cdf_search(scene->light_cdf + emitter->first, emitter->count, pick);
-    const float root = sqrt(u);
+    const float root = sqrt_of(u);
     Hit hit;
     hit.t = 0.0f;
     hit.primitive = scene->light_faces[emitter->first + entry];
@@ -88,7 +88,7 @@ INLINE float3 area_point(const Scene *scene, __global const Emitter *emitter, fl
         p = sphere_direction(u, v);
         n = transform_vector(world, p);
     } else if (CLVOL_HAS_AREA_DISK && shape->kind == SURFACE_DISK) {
-        const float r = sqrt(u);
+        const float r = sqrt_of(u);
         p = (float3)(r * turn.x, r * turn.y, 0.0f);
         n = (float3)(inverse[8], inverse[9], inverse[10]);
     } else { /* a cylinder, round in the world too */
@@ -115,10 +115,10 @@ INLINE void sample_area(const Scene *scene, __global const Emitter *emitter, flo
     }
     float3 ng;
     const float3 to = area_point(scene, emitter, pick, u, v, &ng, &light->primitive) - from;
-    const float square = dot(to, to);
-    light->distance = sqrt(square);
+    const float square = dot_of(to, to);
+    light->distance = sqrt_of(square);
     light->direction = to / max_of(light->distance, 1e-30f);
-    const float facing = -dot(ng, light->direction) * emitter->area; /* the area as it is seen from `from` */
+    const float facing = -dot_of(ng, light->direction) * emitter->area; /* the area as it is seen from `from` */
     light->value = (float3)(0.0f);
     light->pdf = 0.0f;
     if (facing > 0.0f) {
@@ -131,7 +131,7 @@ INLINE void sample_area(const Scene *scene, __global const Emitter *emitter, flo
 INLINE __global const Emitter *seen_light(const Scene *scene, const Surface *surface, float3 d)
 {
     const int number = scene->shapes[surface->shape].emitter;
-    return number >= 0 && dot(surface->ng, d) < 0.0f ? scene->emitters + number : 0;
+    return number >= 0 && dot_of(surface->ng, d) < 0.0f ? scene->emitters + number : 0;
 }
 
 /* Radiance that a ray with direction of travel d meets at the surface. */
@@ -152,7 +152,7 @@ INLINE float area_pdf(const Scene *scene, const Surface *surface, float3 from, f
     SphereCone cone;
     if (CLVOL_HAS_AREA_SPHERE && shape->kind == SURFACE_SPHERE && sphere_cone(shape, from, &cone))
         return emitter->select_pdf * cone_pdf(&cone);
-    return emitter->select_pdf * distance * distance / (emitter->area * -dot(surface->ng, d));
+    return emitter->select_pdf * distance * distance / (emitter->area * -dot_of(surface->ng, d));
 }
 
 #endif

@@ -16,7 +16,7 @@ INLINE float2 envmap_position(const Scene *scene, float3 direction)
     const float width = (float)scene->envmap->size[0], height = (float)scene->envmap->size[1];
     float column = atan2(d.x, -d.z) * (0.5f / PI) * width - 0.5f;
     column -= floor(column / width) * width;
-    const float polar = atan2(sqrt(d.x * d.x + d.z * d.z), d.y); /* acos(d.y) is blind near the poles */
+    const float polar = atan2(sqrt_of(d.x * d.x + d.z * d.z), d.y); /* acos(d.y) is blind near the poles */
     return (float2)(column, polar * (1.0f / PI) * (height - 1.0f));
 }
 

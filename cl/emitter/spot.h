@@ -10,7 +10,7 @@ INLINE float spot_falloff(__global const Emitter *emitter, float3 d)
 {
     const float3 axis = (float3)(emitter->vector[0], emitter->vector[1], emitter->vector[2]);
     const float3 across = cross(axis, d);
-    const float angle = atan2(sqrt(dot(across, across)), dot(axis, d)); /* a cosine is blind near the axis */
+    const float angle = atan2(sqrt_of(dot_of(across, across)), dot_of(axis, d)); /* a cosine is blind near the axis */
     if (angle <= emitter->beam_width)
         return 1.0f;
     if (!(angle < emitter->cutoff_angle))
@@ -21,7 +21,7 @@ INLINE float spot_falloff(__global const Emitter *emitter, float3 d)
 INLINE void sample_spot(__global const Emitter *emitter, float3 from, LightSample *light)
 {
     const float3 to = (float3)(emitter->position[0], emitter->position[1], emitter->position[2]) - from;
-    light->distance = sqrt(dot(to, to));
+    light->distance = sqrt_of(dot_of(to, to));
     light->direction = to / light->distance;
     light->value = emitter_value(emitter) * (spot_falloff(emitter, -light->direction) /
                                              (emitter->select_pdf * light->distance * light->distance));

@@ -21,7 +21,7 @@ INLINE float2 unit_circle_roots(float3 o, float3 d)
     const float half_chord2 = 1.0f - (closest.x * closest.x + (closest.y * closest.y + closest.z * closest.z));
     if (!(half_chord2 >= 0.0f))
         return NEVER;
-    const float q = b + with_sign(sqrt(a * half_chord2), b);
+    const float q = b + with_sign(sqrt_of(a * half_chord2), b);
     const float c = (o.x * o.x + (o.y * o.y + o.z * o.z)) - 1.0f;
     return (float2)(q == 0.0f ? 0.0f : c / q, q / a);
 }

@@ -35,15 +35,15 @@ INLINE void clip_box(Ray ray, float3 lower, float3 upper, float *t0, float *t1)
    which keeps its precision for far origins (Haines et al. 2019). */
 INLINE void clip_sphere(Ray ray, float *t0, float *t1)
 {
-    const float a = dot(ray.d, ray.d);
-    const float middle = -dot(ray.o, ray.d) / a;
+    const float a = dot_of(ray.d, ray.d);
+    const float middle = -dot_of(ray.o, ray.d) / a;
     const float3 closest = ray.o + middle * ray.d;
-    const float discriminant = (1.0f - dot(closest, closest)) / a;
+    const float discriminant = (1.0f - dot_of(closest, closest)) / a;
     if (!(discriminant > 0.0f)) {
         *t1 = -INFINITY;
         return;
     }
-    const float half_chord = sqrt(discriminant);
+    const float half_chord = sqrt_of(discriminant);
     *t0 = max_of(*t0, middle - half_chord);
     *t1 = min_of(*t1, middle + half_chord);
 }
@@ -72,7 +72,7 @@ INLINE float nearest_approach(__global const Medium *medium, Ray ray)
     } else {
         local_ray = transform_ray(medium->shape_from_world, ray);
     }
-    return max_of(-dot(local_ray.o, local_ray.d) / dot(local_ray.d, local_ray.d), 0.0f);
+    return max_of(-dot_of(local_ray.o, local_ray.d) / dot_of(local_ray.d, local_ray.d), 0.0f);
 }
 
 /* The segment of a ray inside a medium, as two numbers.  Of one that is thin beside the scene, entry and exit are

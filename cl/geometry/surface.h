@@ -18,7 +18,7 @@ typedef struct {
 
 INLINE float3 to_local(const Surface *surface, float3 world)
 {
-    return (float3)(dot(world, surface->s), dot(world, surface->t), dot(world, surface->n));
+    return (float3)(dot_of(world, surface->s), dot_of(world, surface->t), dot_of(world, surface->n));
 }
 
 INLINE float3 to_world(const Surface *surface, float3 d)
@@ -39,10 +39,10 @@ INLINE float span_of(float3 ng, float3 a, float3 b, float3 c)
 /* Frame round the normal n whose first tangent follows dp/du, any where that is none. */
 INLINE void set_frame(Surface *surface, float3 n, float3 dp_du)
 {
-    float3 s = dp_du - n * dot(n, dp_du);
-    const float square = dot(s, s);
+    float3 s = dp_du - n * dot_of(n, dp_du);
+    const float square = dot_of(s, s);
     surface->n = n;
-    surface->s = square > 1e-20f * dot(dp_du, dp_du) ? s / sqrt(square) : to_frame(n, 1.0f, 0.0f, 0.0f);
+    surface->s = square > 1e-20f * dot_of(dp_du, dp_du) ? s / sqrt_of(square) : to_frame(n, 1.0f, 0.0f, 0.0f);
     surface->t = cross(n, surface->s);
 }
 
@@ -80,9 +80,9 @@ INLINE void triangle_surface(const Scene *scene, const Hit *hit, __global const 
     if (CLVOL_HAS_SHADING_NORMALS && shape->normals) {
         const float3 smooth = w * vload3(face[0], scene->normals) + u * vload3(face[1], scene->normals) +
                               v * vload3(face[2], scene->normals);
-        const float square = dot(smooth, smooth);
+        const float square = dot_of(smooth, smooth);
         if (square > 0.0f)
-            n = smooth / sqrt(square);
+            n = smooth / sqrt_of(square);
     }
     if (shape->flip) {
         surface->ng = -surface->ng;
@@ -97,7 +97,7 @@ INLINE void quadric_surface(const Scene *scene, Ray ray, const Hit *hit, __globa
     float3 normal, dp_du;
     if (shape->kind == SURFACE_DISK) {
         p.z = 0.0f;
-        const float r = sqrt(p.x * p.x + p.y * p.y);
+        const float r = sqrt_of(p.x * p.x + p.y * p.y);
         normal = (float3)(0.0f, 0.0f, 1.0f);
         dp_du = r > 0.0f ? (float3)(p.x, p.y, 0.0f) : (float3)(1.0f, 0.0f, 0.0f);
         const float turn = atan2(p.y, p.x) * (0.5f / PI);
@@ -110,7 +110,7 @@ INLINE void quadric_surface(const Scene *scene, Ray ray, const Hit *hit, __globa
             normal = p;
             surface->uv = (float2)(around, acos(clamp_to(p.z, -1.0f, 1.0f)) * (1.0f / PI));
         } else {
-            const float r = sqrt(p.x * p.x + p.y * p.y);
+            const float r = sqrt_of(p.x * p.x + p.y * p.y);
             p.x /= r, p.y /= r;
             normal = (float3)(p.x, p.y, 0.0f);
             surface->uv = (float2)(around, p.z);
@@ -147,7 +147,7 @@ INLINE Surface hit_surface(const Scene *scene, Ray ray, const Hit *hit)
    large slanted triangle or sphere passes near the origin, its own coordinates are what was rounded. */
 INLINE float3 spawn_point(const Surface *surface, float3 d)
 {
-    const float3 n = dot(surface->ng, d) < 0.0f ? -surface->ng : surface->ng;
+    const float3 n = dot_of(surface->ng, d) < 0.0f ? -surface->ng : surface->ng;
     const float largest = max_of(largest3(surface->p), surface->span);
     const float distance = (largest + 1e-30f) * 0x1p-20f; /* 8 units in the last place of the largest */
     return surface->p + distance * n;

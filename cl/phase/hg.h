@@ -21,13 +21,13 @@ INLINE float2 hg_cosine(float g, float u)
 INLINE float hg_density(float g, float one_minus_cos)
 {
     const float d = 2.0f * g * one_minus_cos + (1.0f - g) * (1.0f - g);
-    return INV_FOUR_PI * (1.0f - g) * (1.0f + g) / (d * sqrt(d));
+    return INV_FOUR_PI * (1.0f - g) * (1.0f + g) / (d * sqrt_of(d));
 }
 
 INLINE float hg_pdf(__global const Phase *lobe, float3 wo, float3 wi)
 {
     const float3 difference = hg_peak(lobe->g, wo) - wi; /* half its square is 1 - cos, exactly so near 0 */
-    return hg_density(abs_of(lobe->g), 0.5f * dot(difference, difference));
+    return hg_density(abs_of(lobe->g), 0.5f * dot_of(difference, difference));
 }
 
 INLINE float3 hg_sample(__global const Phase *lobe, float3 wo, float u, float v, float *pdf)

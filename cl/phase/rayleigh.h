@@ -19,7 +19,7 @@ INLINE float2 rayleigh_cosine(float u)
     return u < 0.5f ? (float2)(2.0f - x, x) : (float2)(x, 2.0f - x);
 }
 
-INLINE float rayleigh_pdf(__global const Phase *lobe, float3 wo, float3 wi) { return rayleigh_density(dot(wo, wi)); }
+INLINE float rayleigh_pdf(__global const Phase *lobe, float3 wo, float3 wi) { return rayleigh_density(dot_of(wo, wi)); }
 
 INLINE float3 rayleigh_sample(__global const Phase *lobe, float3 wo, float u, float v, float *pdf)
 {

@@ -30,7 +30,7 @@ __kernel void places(CLVOL_ARGUMENTS, __global const float *given, __global floa
         const Surface surface = hit_surface(&scene, ray, &hit);
         hits[3 * n] = hit.t;
         hits[3 * n + 1] = (float)surface.shape;
-        hits[3 * n + 2] = dot(surface.ng, ray.d) < 0.0f ? 1.0f : 0.0f;
+        hits[3 * n + 2] = dot_of(surface.ng, ray.d) < 0.0f ? 1.0f : 0.0f;
     }
 #endif
 }

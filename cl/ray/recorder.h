@@ -37,7 +37,7 @@ INLINE void record_event(Tally *tally, int kind, float t, float3 value)
 }
 
 /* The ray parameter of an index position: of use to a picture, too coarse for anything else. */
-INLINE float parameter_of(Ray ray, float3 p) { return dot(p - ray.o, ray.d) / dot(ray.d, ray.d); }
+INLINE float parameter_of(Ray ray, float3 p) { return dot_of(p - ray.o, ray.d) / dot_of(ray.d, ray.d); }
 
 #define RECORD_WALKS
 #define RECORD_TENTATIVE(t, rate, tally) record_event(tally, EVENT_TENTATIVE, t, (float3)(rate))

@@ -17,7 +17,7 @@ INLINE void cross_boundary(__global const Shape *shape, float3 ng, float3 d, Ins
     if (shape->boundary < 0)
         return;
     const uint bit = 1u << (shape->boundary & 31);
-    if (dot(ng, d) < 0.0f)
+    if (dot_of(ng, d) < 0.0f)
         inside->word[shape->boundary >> 5] |= bit;
     else
         inside->word[shape->boundary >> 5] &= ~bit;
@@ -42,7 +42,7 @@ INLINE Inside find_inside(const Scene *scene, Ray ray)
             continue;
         const int word = shape->boundary >> 5;
         const uint bit = 1u << (shape->boundary & 31);
-        if (!(seen.word[word] & bit) && dot(surface.ng, ray.d) > 0.0f)
+        if (!(seen.word[word] & bit) && dot_of(surface.ng, ray.d) > 0.0f)
             inside.word[word] |= bit;
         seen.word[word] |= bit;
     }

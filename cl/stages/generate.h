@@ -72,13 +72,13 @@ INLINE void set_camera_ray(const Scene *scene, uint slot, float x, float y, floa
     float3 towards = load_vector(render->camera_base) + x * load_vector(render->camera_base_dx) +
                      y * load_vector(render->camera_base_dy);
     if (CLVOL_HAS_LENS) {
-        const float2 place = sqrt(u) * cos_sin_turn(v);
+        const float2 place = sqrt_of(u) * cos_sin_turn(v);
         const float3 lens = place.x * load_vector(render->lens_x) + place.y * load_vector(render->lens_y);
         origin += render->lens_start * lens;
         towards -= render->lens_bend * lens;
     }
     set_path_origin(scene, slot, origin);
-    set_path_direction(scene, slot, normalize(towards));
+    set_path_direction(scene, slot, unit_of(towards));
 }
 
 INLINE void start_job(const Scene *scene, uint slot, uint job)

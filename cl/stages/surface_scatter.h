@@ -86,7 +86,7 @@ INLINE bool surface_next_event(const Scene *scene, uint slot, SampleKey key, con
     cross_boundary(scene->shapes + surface->shape, surface->ng, light.direction, &inside);
     set_path_shadow_inside(scene, slot, inside);
     const float3 start = spawn_point(surface, light.direction);
-    light.distance -= dot(start - surface->p, light.direction); /* now from there */
+    light.distance -= dot_of(start - surface->p, light.direction); /* now from there */
     make_shadow_ray(scene, slot, start, &light, value);
     return true;
 #else
@@ -167,7 +167,7 @@ INLINE bool shade_surface(const Scene *scene, uint slot, bool *shadow_ray)
     *shadow_ray = surface_next_event(scene, slot, key, &surface, &side, wi, beta);
     if (!sampled)
         return false;
-    const float3 d = normalize(to_world(&surface, on_side(&side, sample.direction)));
+    const float3 d = unit_of(to_world(&surface, on_side(&side, sample.direction)));
     return leave_surface(scene, slot, key, &surface, d, sample.pdf, sample.eta, beta * sample.weight);
 #else
     return false;
