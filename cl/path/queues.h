@@ -23,21 +23,17 @@ INLINE __global uint *idle_slots(const Scene *scene, uint group)
     return scene->queue_lengths + group * QUEUE_LENGTHS_STRIDE + QUEUE_COUNT;
 }
 
-/* Adds to a count of the group's own, and returns what it was.  A group of one work-item shares it with nobody. */
-INLINE uint group_add(__global uint *count, uint more)
-{
+/* Adds to a count of the group's own, and returns what it was.  A group of one work-item shares it with nobody.  A
+   macro, so that what looks for races names the place that adds. */
 #if CLVOL_LOCAL_SIZE == 1
-    const uint before = *count;
-    *count = before + more;
-    return before;
+#define group_atomic_add(count, more) ((*(count) += (more)) - (more))
 #else
-    return atomic_add(count, more);
+#define group_atomic_add(count, more) atomic_add(count, more)
 #endif
-}
 
 INLINE void queue_push(const Scene *scene, uint group, uint queue, uint slot)
 {
-    const uint place = group_add(queue_length(scene, group, queue), 1);
+    const uint place = group_atomic_add(queue_length(scene, group, queue), 1);
     queue_entries(scene, group, queue)[place] = slot;
 }
 

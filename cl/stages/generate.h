@@ -155,7 +155,7 @@ INLINE void wake_idle(const Scene *scene, uint group)
     for (uint i = get_local_id(0); i < CLVOL_GROUP_SLOTS; i += CLVOL_LOCAL_SIZE) {
         const uint slot = group * CLVOL_GROUP_SLOTS + i;
         if (path_job(scene, slot) == NO_JOB && take_job(scene, group, slot))
-            group_add(idle_slots(scene, group), -1u);
+            group_atomic_add(idle_slots(scene, group), -1u);
     }
 }
 

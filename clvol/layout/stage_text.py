@@ -42,7 +42,7 @@ def _transition_text(transition: Transition, values: Mapping[str, Value]) -> str
     """The function that a transition is."""
     value, body = "", [f"queue_push(scene, group, QUEUE_{transition.to}, slot);"]
     if transition.to == IDLE:
-        body = ["group_add(idle_slots(scene, group), 1);"]
+        body = ["group_atomic_add(idle_slots(scene, group), 1);"]
     if transition.sets:
         value = f", uint {transition.sets}"
         body.insert(0, values[transition.sets].store(transition.sets))

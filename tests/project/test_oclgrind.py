@@ -59,7 +59,7 @@ def log(read: str, changed: str) -> str:
 
 
 def test_what_is_found_is_told_with_its_places_and_counted(oclgrind: ModuleType, capsys) -> None:
-    found = oclgrind.findings(log("idle_slots(scene, group) == 0", "atomic_dec(idle_slots"))
+    found = oclgrind.findings(log("idle_slots(scene, group) == 0", "atomic_add(idle_slots"))
     assert sorted(found.values()) == [1, 2]
     assert oclgrind.report("a case", found)
     [_, line] = capsys.readouterr().out.splitlines()
@@ -68,7 +68,7 @@ def test_what_is_found_is_told_with_its_places_and_counted(oclgrind: ModuleType,
 
 def test_no_race_passes_but_those_of_counters_that_are_looked_at_first(oclgrind: ModuleType) -> None:
     known = ("scene->counters[COUNTER_NEXT_JOB] >= limit", "atomic_inc(scene->counters + COUNTER_NEXT_JOB)")
-    others = (("set_path_job(scene, slot, NO_JOB)", "atomic_dec(idle_slots"), (known[0], known[0]))
+    others = (("set_path_job(scene, slot, NO_JOB)", "atomic_add(idle_slots"), (known[0], known[0]))
     for places, harmless in ((known, True), *((places, False) for places in others)):
         [race] = [f for f in oclgrind.findings(log(*places)) if "race" in f.what]
         assert race.is_harmless == harmless
