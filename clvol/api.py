@@ -14,11 +14,13 @@ from clvol.base.interrupts import interruptible
 from clvol.base.progress import Progress, ProgressCallback, RichProgress
 from clvol.device.device import Device, open_device
 from clvol.errors import OptionError, shown
+from clvol.picture.profile import RENDER
 from clvol.planning import registry
 from clvol.planning.choices import NUMBERS, Choices
 from clvol.planning.plan import Plan
 from clvol.rendering.adaptive import TargetRender
 from clvol.rendering.outcome import make_result
+from clvol.rendering.profiler import Profiler, timed
 from clvol.rendering.session import MAX_SAMPLES, Session
 from clvol.scene.records import Scene
 
@@ -53,6 +55,7 @@ def render(
     progress: bool | ProgressCallback = False,
     samples: tuple[int, int] | None = None,
     pool: int | None = None,
+    profile: bool = False,
 ) -> Result:
     """Render a scene.
 
@@ -89,6 +92,8 @@ def render(
         (first, count): render only these of the samples. Results of disjoint ranges `merge`.
     pool
         Paths in flight, for measurements. The picture does not depend on it.
+    profile
+        Find out where the time goes: ``result.profile``.
 
     Returns
     -------
@@ -122,27 +127,32 @@ def render(
     first, count = _sample_range(scene, spp, time_limit, samples)
     seed = check_seed(scene.seed if seed is None else seed)
     bar = RichProgress() if progress is True else nullcontext(progress or None)
+    profiler = Profiler() if profile else None
     started = time.perf_counter()
-    planned = Plan.of(scene, choices)
+    with timed(profiler, "plan"):
+        planned = Plan.of(scene, choices)
     spent = time.perf_counter() - started
-    opened = open_device(device)
+    with timed(profiler, "device"):
+        opened = open_device(device)
     if piloted:
-        with bar as callback:
+        with bar as callback, timed(profiler, "pilot"):
             choices, found, options = _piloted(opened, scene, choices, seed, count, time_limit, callback)
         planned = planned.having(choices, dict.fromkeys(found.names, "chosen by the pilot"))
-    session = Session.for_plan(opened, scene, planned, seed, pool, spent)
+    session = Session.for_plan(opened, scene, planned, seed, pool, spent, profiler)
     session.describe()
     session.warn(asked)
     with interruptible() as interrupt:
-        with bar as callback:
+        with bar as callback, timed(profiler, RENDER):
             interrupt.heed(patience=2)
             if target_error is None:
                 done = session.run(first, count, time_limit, callback, interrupt.urgency)
             else:
                 done = TargetRender(session, target_error, spp).run(time_limit, callback, interrupt.urgency)
             interrupt.keep()
-        result = make_result(session, first, done)
+        with timed(profiler, "picture"):
+            result = make_result(session, first, done)
         result.stats["interrupted"] = interrupt.asked()
+    result.profile = profiler.profile(result) if profiler else None
     if target_error is not None:
         result.metadata["target_error"] = target_error
     if piloted:

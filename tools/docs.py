@@ -10,6 +10,8 @@ import re
 import shlex
 import subprocess
 import sys
+import tempfile
+import textwrap
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,9 +31,11 @@ if TYPE_CHECKING:
 
 DOCS = ROOT / "docs"
 PERFORMANCE, ARCHITECTURE = DOCS / "performance.md", DOCS / "architecture.md"
+COMMAND_LINE = DOCS / "command-line.md"
 PICTURED = ("gallery.md", "ray.md")
 """Pages whose commands make their pictures."""
 FIRST, LAST = "<!-- performance: written by tools/docs.py -->", "<!-- end of performance -->"
+PROFILE = "<!-- profile: written by tools/docs.py -->", "<!-- end of profile -->"
 TRANSITIONS = "<!-- transitions: written by tools/docs.py -->", "<!-- end of transitions -->"
 
 
@@ -147,6 +151,20 @@ def performance(context: click.Context, mitsuba: str | None, rough: bool, output
 
 
 @main.command()
+@output_option(COMMAND_LINE)
+def profile(output: Path) -> None:
+    """The profile in command-line.md, between its markers, by the command that stands before it."""
+    before, after = between(output.read_text(encoding="utf-8"), *PROFILE, output.name)
+    words = shlex.split(before.rsplit("```", 2)[1])
+    with tempfile.TemporaryDirectory() as folder:
+        written = {name: str(Path(folder) / name) for name in ("room.exr", "room.json")}
+        words = [written.get(word, word) for word in words[1:]]
+        command = [sys.executable, "-m", "clvol.cli.main", *words, "--quiet"]
+        printed = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
+    write(output, f"{before}\n```\n{textwrap.dedent(printed)}```\n{after}")
+
+
+@main.command()
 @output_option(ARCHITECTURE)
 def transitions(output: Path) -> None:
     """The table of architecture.md, between its markers, from the contracts of the stages."""
@@ -158,14 +176,21 @@ def transitions(output: Path) -> None:
 @mitsuba_option
 @click.pass_context
 def everything(context: click.Context, mitsuba: str | None) -> int:
-    """Everything: pictures, techniques, pilot, performance, in about an hour on two cores.
+    """Everything: pictures, profile, techniques, pilot, performance, in about an hour on two cores.
 
     Figures are of a machine that does nothing else meanwhile. The exit status is 1 where one of the parts
     says so.
     """
     enclosed(PERFORMANCE)
     status = 0
-    for part, options in ((pictures, {}), (techniques, {}), (pilot, {}), (performance, {"mitsuba": mitsuba})):
+    parts = (
+        (pictures, {}),
+        (profile, {}),
+        (techniques, {}),
+        (pilot, {}),
+        (performance, {"mitsuba": mitsuba}),
+    )
+    for part, options in parts:
         started = time.monotonic()
         status = max(status, context.invoke(part, **options) or 0)
         click.echo(f"{part.name}: {(time.monotonic() - started) / 60:.0f} minutes", err=True)

@@ -31,6 +31,12 @@ INLINE __global uint *idle_slots(const Scene *scene, uint group)
 #define group_atomic_add(count, more) atomic_add(count, more)
 #endif
 
+/* Paths of the queue that its stage has handled so far; it runs over. */
+INLINE __global uint *queue_handled(const Scene *scene, uint group, uint queue)
+{
+    return scene->queue_lengths + group * QUEUE_LENGTHS_STRIDE + QUEUE_COUNT + 1 + queue;
+}
+
 INLINE void queue_push(const Scene *scene, uint group, uint queue, uint slot)
 {
     const uint place = group_atomic_add(queue_length(scene, group, queue), 1);
@@ -42,8 +48,10 @@ INLINE void queue_push(const Scene *scene, uint group, uint queue, uint slot)
 INLINE void queue_clear(const Scene *scene, uint group, uint queue)
 {
     barrier(CLK_GLOBAL_MEM_FENCE);
-    if (get_local_id(0) == 0)
+    if (get_local_id(0) == 0) {
+        *queue_handled(scene, group, queue) += *queue_length(scene, group, queue);
         *queue_length(scene, group, queue) = 0;
+    }
 }
 
 #endif

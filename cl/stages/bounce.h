@@ -47,6 +47,7 @@ INLINE void make_shadow_ray(const Scene *scene, uint slot, float3 from, const Li
     set_path_shadow_primitive(scene, slot, light->primitive);
 #endif
     set_path_shadow_light(scene, slot, value);
+    set_path_shadow_rays(scene, slot, path_shadow_rays(scene, slot) + 1);
 }
 #endif
 

@@ -35,7 +35,7 @@ def output_suffix(path: StrPath, suffixes: Sequence[str]) -> str:
         raise OptionError(
             f"unknown format '{suffix}'" if suffix else "no format",
             where=str(path),
-            hint=f"name the file {', '.join(suffixes[:-1])} or {suffixes[-1]}",
+            hint=f"name the file {' or '.join(filter(None, (', '.join(suffixes[:-1]), suffixes[-1])))}",
         )
     return suffix
 

@@ -21,10 +21,13 @@ from clvol.cli.options import (
     quiet_option,
     step_option,
 )
+from clvol.errors import Error
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from clvol.base.output_files import StrPath
+    from clvol.picture.profile import Profile
     from clvol.picture.result import Result
 
 EXAMPLES = """
@@ -39,6 +42,7 @@ Examples:
   clvol render scenes/cloud.xml -o cloud.exr --target-error 0.01
   clvol render scenes/fire.xml -o fire.exr --technique weighted-delta --majorant-scale 0.8
   clvol render scenes/smoke.xml -o smoke.exr --aov cells --aov largest_weight
+  clvol render scenes/room.xml -o room.exr --profile --trace room.json
 """
 
 
@@ -110,6 +114,12 @@ class RenderCommand(ExplainedCommand):
     is_flag=True,
     help="Print the plan as `clvol info` does, with choices and their reasons, memory, and time by stage.",
 )
+@click.option("--profile", is_flag=True, help="Print where the time went, kernel by kernel.")
+@click.option(
+    "--trace",
+    metavar="FILE",
+    help="Write when each kernel ran, as a .json that Perfetto and chrome://tracing show.",
+)
 @quiet_option
 def render(
     scene: str,
@@ -119,6 +129,8 @@ def render(
     definitions: tuple[tuple[str, str], ...],
     exposure: float,
     verbose: bool,
+    profile: bool,
+    trace: str | None,
     quiet: bool,
     **options: Any,
 ) -> None:
@@ -127,17 +139,12 @@ def render(
     Ctrl-C ends the render early and keeps the picture so far; so do SIGTERM and SIGHUP.
     """
     from clvol.base.progress import RichProgress, error_console
-    from clvol.picture.saving import check_disk, check_picture, save_all
+    from clvol.cli.profile import profile_lines
+    from clvol.picture.saving import check_disk, save_all
 
     if spp is not None and time_limit is not None:
         raise click.UsageError("give --spp or --time, not both")
-    for output in outputs:
-        check_picture(output, exposure)
-    if options["aov"] and not any(output.lower().endswith(".exr") for output in outputs):
-        raise click.UsageError("--aov needs an .exr to write to")
-    if exposure and not any(output.lower().endswith(".png") for output in outputs):
-        raise click.UsageError("--exposure needs a .png to write to: an .exr is as bright as the scene")
-    _check_distinct(scene, outputs)
+    _check_files(scene, outputs, trace, exposure, bool(options["aov"]))
     console = error_console()
     with logging_to(console, verbose):
         import clvol
@@ -152,21 +159,51 @@ def render(
 
             mention([announcement(loaded, options)], err=True)
         with nullcontext(False) if quiet else RichProgress(console) as progress:
-            result = clvol.render(loaded, spp=spp, time_limit=time_limit, progress=progress, **options)
+            options |= {"spp": spp, "time_limit": time_limit, "profile": profile or trace is not None}
+            result = clvol.render(loaded, progress=progress, **options)
         if piloted:
             from clvol.lab.repeat import with_definitions
 
             result.metadata["repeat"] = with_definitions(result.metadata["repeat"], dict(definitions))
         failures = save_all(lambda suffix: result.encode(suffix, exposure), outputs)
+        if trace is not None and result.profile:
+            failures |= _save_trace(result.profile, trace)
     written = [output for output in outputs if output not in failures]
     if result.stats["interrupted"]:
         saved = ", saved what there is" if written else ""
         mention([f"clvol: interrupted after {result.samples[1]} spp{saved}"], err=True)
     if not quiet:
         mention(_summary(result, written))
+    if profile and result.profile:
+        mention(profile_lines(result.profile))
     for failure in failures.values():
         raise failure
     exit_by(result.stats["interrupted"])
+
+
+def _check_files(scene: str, outputs: Sequence[str], trace: str | None, exposure: float, aovs: bool) -> None:
+    """Refuse what could not be written after a long render, and what nothing would be written of."""
+    from clvol.picture.profile import check_trace
+    from clvol.picture.saving import check_picture
+
+    for output in outputs:
+        check_picture(output, exposure)
+    if aovs and not any(output.lower().endswith(".exr") for output in outputs):
+        raise click.UsageError("--aov needs an .exr to write to")
+    if exposure and not any(output.lower().endswith(".png") for output in outputs):
+        raise click.UsageError("--exposure needs a .png to write to: an .exr is as bright as the scene")
+    if trace is not None:
+        check_trace(trace)
+    _check_distinct(scene, outputs if trace is None else (*outputs, trace))
+
+
+def _save_trace(profile: Profile, path: str) -> dict[StrPath, Error]:
+    """Write the trace; what went wrong with it, if anything."""
+    try:
+        profile.save_trace(path)
+    except Error as error:
+        return {path: error}
+    return {}
 
 
 def _check_distinct(scene: str, outputs: Sequence[str]) -> None:

@@ -42,6 +42,7 @@ from clvol.layout.path_state import (
     shows_weight,
     slot_fields,
 )
+from clvol.layout.path_text import state_traffic
 from clvol.layout.records import (
     EMITTER,
     ENUMS,
@@ -59,7 +60,7 @@ from clvol.layout.records import (
 )
 from clvol.layout.shared_text import kinds_text, record_text, shared_text
 from clvol.layout.stage_text import stage_text
-from clvol.layout.stages import EVENTS, QUEUES, STAGES, launched, stage, targets
+from clvol.layout.stages import EVENTS, HANDLED, QUEUES, STAGES, launched, stage, targets
 from clvol.layout.text import layout_text
 
 __all__ = [
@@ -86,6 +87,7 @@ __all__ = [
     "ENVMAP",
     "EVENTS",
     "FIRST_HIT",
+    "HANDLED",
     "MATERIAL",
     "MEDIUM",
     "NO_JOB",
@@ -122,5 +124,6 @@ __all__ = [
     "slot_fields",
     "stage",
     "stage_text",
+    "state_traffic",
     "targets",
 ]

@@ -64,8 +64,9 @@ COUNTS = {
     "real": "real collisions",
     "cells": "majorant cells crossed",
     "violations": "look-ups above their majorant",
+    "shadow_rays": "shadow rays traced",
 }
-"""What walks count."""
+"""What is counted along a path: by its walks, and where it scatters."""
 
 FIRST_HIT = {"depth": 1, "normal": 3, "albedo": 3, "position": 3}
 """Pictures of what camera paths first meet, and the channels of each."""
@@ -108,6 +109,7 @@ PATH_STATE: tuple[Declared, ...] = (
     _count("real", "CLVOL_HAS_MEDIA"),
     _count("cells", _WALKS),
     _count("violations", _WALKS),
+    _count("shadow_rays", _NEE),
     Declared(
         "sample_weight",
         "f",
@@ -216,6 +218,7 @@ SLOT_STATISTICS: dict[str, Callable[..., Any]] = {
     "real": np.sum,
     "cells": np.sum,
     "violations": np.sum,
+    "shadow_rays": np.sum,
     "cut": np.sum,
     "cut_energy": np.sum,
     "largest_weight": np.max,

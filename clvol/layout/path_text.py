@@ -90,6 +90,13 @@ def path_values(macros: Macros) -> dict[str, Value]:
     }
 
 
+def state_traffic(macros: Macros, stage: Stage) -> int:
+    """Bytes of a path's state that a stage reads and writes at most: each value of its contract once."""
+    values = path_values(macros)
+    named = [*stage.reads, *stage.writes, *stage.sets]
+    return 4 * sum(len(values[name].rows) for name in named)
+
+
 def path_text(macros: Macros, stage: Stage | None) -> list[str]:
     """The functions of the values that a stage's contract names; of all values where there is no stage."""
     lines = [f"typedef struct {{ uint word[{max(macros['CLVOL_BOUNDARY_WORDS'], 1)}]; }} Inside;"]

@@ -42,6 +42,8 @@ QUEUES = {
 }
 IDLE = "IDLE"
 """Where slots are that hold no path: counted, in no queue."""
+HANDLED = slice(len(QUEUES) + 1, 2 * len(QUEUES) + 1)
+"""Of a group's counters, behind the queues' lengths and the idle slots: paths handled, by queue."""
 EVENTS = {
     "ESCAPE": "the ray leaves the scene",
     "COLLISION": "the path collides in a medium",
@@ -123,7 +125,7 @@ def _fields(*words: str) -> frozenset[str]:
 
 _RAY = "origin direction"
 _KEY = "pixel sample bounce"  # of random numbers
-_COUNTS = "lookups tentative real cells violations"
+_COUNTS = "lookups tentative real cells violations"  # of walks
 _FIRST_HIT = "depth normal albedo position met"
 _HIT = "hit_t hit_primitive hit_u hit_v"
 _PASSED = "segment after_t after_primitive"
@@ -143,11 +145,12 @@ STAGES = (
             Transition("INTERSECT", "a job is left: a new path begins"),
             Transition(IDLE, "no job is left: the slot is empty until there are jobs again"),
         ),
-        reads=_fields("job radiance sample_weight largest_weight", _COUNTS, _FIRST_HIT),
+        reads=_fields("job radiance sample_weight largest_weight", _COUNTS, "shadow_rays", _FIRST_HIT),
         writes=_fields(
             _RAY,
             _KEY,
             _COUNTS,
+            "shadow_rays",
             _PASSED,
             _FIRST_HIT,
             "job beta radiance sample_weight channel pdf inside eta_squared largest_weight",
@@ -225,7 +228,7 @@ STAGES = (
             _KEY,
             _HIT,
             "event goes_on channel beta radiance pdf medium segment inside eta_squared sample_weight",
-            "largest_weight cut cut_energy exhausted",
+            "largest_weight cut cut_energy exhausted shadow_rays",
         ),
         writes=_fields(
             _RAY,
@@ -233,7 +236,7 @@ STAGES = (
             _SHADOW_RAY,
             _FIRST_HIT,
             "bounce beta radiance pdf inside eta_squared",
-            "largest_weight cut cut_energy exhausted",
+            "largest_weight cut cut_energy exhausted shadow_rays",
         ),
     ),
     Stage(
@@ -257,8 +260,9 @@ STAGES = (
         stands_by="SHADOW",
     ),
 )
-"""In the order of their launches in a wave: a path that nothing holds up goes from a new ray to the next
-one in one wave.  No stage pushes to the queue that it empties: walks that need another go through `shade`."""
+"""In the order of their launches in a wave, and of the queues that they empty: a path that nothing holds up
+goes from a new ray to the next one in one wave.  No stage pushes to the queue that it empties: walks that
+need another go through `shade`."""
 
 
 def stage(name: str) -> Stage:

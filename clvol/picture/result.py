@@ -21,6 +21,8 @@ from clvol.picture.saving import check_picture, save_all
 if TYPE_CHECKING:
     from os import PathLike
 
+    from clvol.picture.profile import Profile
+
 Ranges = tuple[tuple[int, int], ...]
 """Sample ranges as (first, count), ascending, disjoint, not touching."""
 
@@ -73,6 +75,8 @@ class Result:
         Sums over the samples, by which results merge.
     ranges : tuple of (int, int)
         The same as `samples`, but exact where merged ranges leave gaps.
+    profile : `clvol.picture.profile.Profile` or None
+        Where the time went, of a render that was asked for it.
     """
 
     image: np.ndarray
@@ -83,6 +87,7 @@ class Result:
     samples: tuple[int, int]
     estimate: Estimate
     ranges: Ranges = ()
+    profile: Profile | None = None
 
     def __post_init__(self) -> None:
         self.ranges = self.ranges or (self.samples,)

@@ -19,6 +19,7 @@ from clvol.picture.result import relative_noise
 from clvol.planning.in_force import warnings
 from clvol.planning.plan import Plan
 from clvol.planning.settled import Tuning
+from clvol.rendering.profiler import Profiler, timed
 from clvol.rendering.upload import upload_scene
 from clvol.rendering.wavefront import Pool, Progressed, Wavefront
 from clvol.tables.camera import camera_rays
@@ -74,35 +75,51 @@ class Session:
         seed: int,
         pool: int | None = None,
         spent: float = 0.0,
+        profiler: Profiler | None = None,
     ) -> Session:
         """Prepare a scene as planned, and open it; `spent`: seconds that went into the plan."""
         check_seed(seed)
         started = time.perf_counter()
-        prepared = prepare(scene, plan)
+        with timed(profiler, "volumes and tables"):
+            prepared = prepare(scene, plan)
         prepared_after = time.perf_counter() - started
-        session = cls.open(device, prepared, seed, pool)
+        session = cls.open(device, prepared, seed, pool, profiler)
         session.setup_seconds += spent + prepared_after
         return session
 
     @classmethod
-    def open(cls, device: Device, prepared: PreparedScene, seed: int, pool: int | None = None) -> Session:
+    def open(
+        cls,
+        device: Device,
+        prepared: PreparedScene,
+        seed: int,
+        pool: int | None = None,
+        profiler: Profiler | None = None,
+    ) -> Session:
         """Compose and build the kernels, upload the scene, allocate the pool."""
         started = time.perf_counter()
         prepared = on_device(prepared, device)
         plan = prepared.plan
+        if profiler:
+            profiler.attach(device, plan)
         record = render_record(prepared, seed)
         slots = Pool.for_device(device, plan, pool)
         groups, pixels = slots.slots // plan.tuning.group_slots, int(np.prod(record["film_size"]))
-        units = stage_units(plan, groups, pixels)
+        with timed(profiler, "units"):
+            units = stage_units(plan, groups, pixels)
         with SideBuilds(device, units.values()) as builds:
             uploading = time.perf_counter()
-            buffers = upload_scene(device, prepared)
+            with timed(profiler, "upload"):
+                buffers = upload_scene(device, prepared)
             uploaded = time.perf_counter()
-            kernels = build_stages(device, units, builds)
+            with timed(profiler, "kernels"):
+                kernels = build_stages(device, units, builds)
             built = time.perf_counter()
-            wavefront = Wavefront(device, plan, kernels, buffers, record, slots)
+            with timed(profiler, "pool"):
+                wavefront = Wavefront(device, plan, kernels, buffers, record, slots, profiler)
             warming = time.perf_counter()
-            wavefront.warm_up()
+            with timed(profiler, "first launches"):
+                wavefront.warm_up()
             builds.remember()
         ready = time.perf_counter()
         kernel_seconds = uploading - started + built - uploaded + ready - warming

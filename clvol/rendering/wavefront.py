@@ -20,12 +20,15 @@ from clvol import layout
 from clvol.device.launch import launch, scene_arguments, set_arguments
 from clvol.errors import OptionError
 from clvol.rendering.film import Film
+from clvol.rendering.handled import Handled
+from clvol.rendering.profiler import timed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from clvol.device.device import Device
     from clvol.planning.plan import Plan
+    from clvol.rendering.profiler import Profiler
 
 log = logging.getLogger("clvol")
 _NEXT_JOB, _JOB_LIMIT, _NON_FINITE, _DONE = (layout.enum("COUNTER", n) for n in layout.ENUMS["COUNTER"])
@@ -77,6 +80,7 @@ class Wavefront:
     kernels : stage name to kernel, `accumulate` included.
     buffers : scene buffers by argument name.
     render : the Render record, without its schedule fields.
+    profiler : is told of all that goes to the device.
     """
 
     def __init__(
@@ -87,8 +91,10 @@ class Wavefront:
         buffers: dict[str, cl.Buffer],
         render: np.ndarray,
         pool: Pool,
+        profiler: Profiler | None = None,
     ) -> None:
         self.device, self.plan, self.kernels, self.pool = device, plan, kernels, pool
+        self.profiler = profiler
         self.render = render
         self.pixels = int(render["film_size"][0, 0]) * int(render["film_size"][0, 1])
         self.buffers: dict[str, cl.Buffer] = {}
@@ -101,6 +107,7 @@ class Wavefront:
         self.stride = pool.slots + 16  # off the power of two, or all fields of a slot share a cache set
         self.seconds = dict.fromkeys((*plan.stages, "accumulate"), 0.0)
         self.launches = self.waves = 0
+        self.handled = Handled(self.groups)
         self._allocate(buffers)
 
     def _allocate(self, scene_buffers: dict[str, cl.Buffer]) -> None:
@@ -126,6 +133,7 @@ class Wavefront:
         state[[f.name for f in self.fields].index("job")] = layout.NO_JOB
         self._write("state", state)
         self._write("counters", np.zeros(_DONE + self.pool.ring_passes, np.uint32))
+        self._write("queue_lengths", self.handled.all_idle(self.plan.tuning.group_slots))
         values = scene_arguments(self.plan.macros, self.buffers, self.stride)
         for stage in self.plan.stages:
             set_arguments(self.kernels[stage], *values)
@@ -150,12 +158,26 @@ class Wavefront:
     def _reset_clocks(self) -> None:
         self.seconds = dict.fromkeys(self.seconds, 0.0)
         self.launches = self.waves = 0
+        self.handled.clear()
+        if self.profiler:
+            self.profiler.forget()
 
     def _buffer(self, size: int) -> cl.Buffer:
         return self.device.memory.allocate(size, f"a film of {self.pixels} pixels", "render fewer pixels")
 
     def _write(self, name: str, array: np.ndarray, offset: int = 0) -> None:
-        cl.enqueue_copy(self.device.queue, self.buffers[name], array, dst_offset=offset, is_blocking=True)
+        queue, buffer = self.device.queue, self.buffers[name]
+        self._copied(cl.enqueue_copy(queue, buffer, array, dst_offset=offset, is_blocking=True), array.nbytes)
+
+    def _read(self, name: str, array: np.ndarray, offset: int = 0) -> np.ndarray:
+        """Fill `array`, and return it."""
+        queue, buffer = self.device.queue, self.buffers[name]
+        self._copied(cl.enqueue_copy(queue, array, buffer, src_offset=offset, is_blocking=True), array.nbytes)
+        return array
+
+    def _copied(self, event: cl.Event, size: int) -> None:
+        if self.profiler:
+            self.profiler.copied(event, size)
 
     def list_pixels(self, pixels: np.ndarray | None) -> None:
         """What the next run renders: these pixels, each from the first sample on that its film lacks.
@@ -220,7 +242,8 @@ class Wavefront:
             allowed = begun if urgency else min(passes, finished + self.pool.ring_passes)
             limit = sum(samples[:allowed]) * self.sample_jobs
             self._write("counters", np.array([limit], np.uint32), 4 * _JOB_LIMIT)
-            launched, elapsed = self._launch(waves)
+            with timed(self.profiler, "waves"):
+                launched, elapsed = self._launch(waves)
             waves = int(np.clip(launched * _BATCH_SECONDS / max(elapsed, 1e-6), 1, max(2 * launched, 4)))
             if time.perf_counter() - self._harvested > _HARVEST_SECONDS:
                 self._harvest()
@@ -277,9 +300,8 @@ class Wavefront:
         counters = np.zeros(_DONE + self.pool.ring_passes, np.uint32)
         counters[_NON_FINITE] = self.non_finite()  # counts over all rounds
         self._write("counters", counters)
-        lengths = np.zeros((self.groups, layout.QUEUE_LENGTHS_STRIDE), np.uint32)
-        lengths[:, len(layout.QUEUES)] = self.plan.tuning.group_slots  # all slots idle
-        self._write("queue_lengths", lengths)
+        self._read_handled()
+        self._write("queue_lengths", self.handled.all_idle(self.plan.tuning.group_slots))
 
     def _launch(self, waves: int) -> tuple[int, float]:
         """Run up to `waves` waves; return how many and the seconds they took, which are booked by stage.
@@ -290,6 +312,8 @@ class Wavefront:
         launched: list[list[cl.Event]] = []
         start = time.perf_counter()
         while len(launched) < waves:
+            if self.profiler:
+                self.profiler.before_wave(self.buffers["queue_lengths"])
             launched.append(
                 [
                     launch(self.device, self.kernels[stage], self.groups * local, local)
@@ -303,6 +327,8 @@ class Wavefront:
         launched[-1][-1].wait()
         self.launches += len(launched) * len(self.plan.stages)
         self.waves += len(launched)
+        if self.profiler:
+            self.profiler.waves(self.buffers["queue_lengths"], self.plan.stages, launched)
         total = 0.0
         for events in launched:
             for stage, event in zip(self.plan.stages, events, strict=True):
@@ -312,9 +338,7 @@ class Wavefront:
         return len(launched), total
 
     def _read_counters(self) -> np.ndarray:
-        counters = np.empty(_DONE + self.pool.ring_passes, np.uint32)
-        cl.enqueue_copy(self.device.queue, counters, self.buffers["counters"], is_blocking=True)
-        return counters
+        return self._read("counters", np.empty(_DONE + self.pool.ring_passes, np.uint32))
 
     def _accumulate(self, ring_pass: int, samples: int, first: int) -> None:
         """Add one finished pass, from sample `first` on, to the film and free its place in the ring."""
@@ -339,6 +363,8 @@ class Wavefront:
         event.wait()
         self.launches += 1
         self.seconds["accumulate"] += 1e-9 * (event.profile.end - event.profile.start)
+        if self.profiler:
+            self.profiler.launched("accumulate", event, samples * self.listed)
         self._write("counters", np.zeros(1, np.uint32), 4 * (_DONE + ring_pass))
 
     def slot_statistics(self) -> dict[str, float]:
@@ -352,14 +378,18 @@ class Wavefront:
         zeros = np.zeros(self.stride, np.uint32)
         totals = self.film.slot_totals
         for name in totals:
-            field, row = self.fields[rows[name]], np.empty(self.stride, np.uint32)
-            at = 4 * self.stride * rows[name]
-            cl.enqueue_copy(self.device.queue, row, self.buffers["state"], src_offset=at, is_blocking=True)
+            field, at = self.fields[rows[name]], 4 * self.stride * rows[name]
+            row = self._read("state", np.empty(self.stride, np.uint32), at)
             self._write("state", zeros, at)
             found = (row.view(np.float32) if field.kind == "f" else row)[: self.pool.slots].astype(np.float64)
             combine = layout.SLOT_STATISTICS[name]
             totals[name] = combine([totals[name], combine(found)]).item()
+        self._read_handled()
         self._harvested = time.perf_counter()
+
+    def _read_handled(self) -> None:
+        shape = self.groups, layout.QUEUE_LENGTHS_STRIDE
+        self.handled.add(self._read("queue_lengths", np.empty(shape, np.uint32)))
 
     def non_finite(self) -> int:
         """Samples that were NaN or infinite."""

@@ -261,6 +261,7 @@ def test_options_reach_render_unchanged(scene: str, tmp_path: Path, monkeypatch:
     assert outcome.exit_code == 0, outcome.output
     del seen["progress"]
     assert seen == {
+        "profile": False,
         "spp": None,
         "samples": None,
         "time_limit": 2.0,

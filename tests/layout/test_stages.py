@@ -38,8 +38,8 @@ def test_every_queue_is_emptied_by_one_stage_which_never_pushes_to_it():
         assert {t.to for t in stage.transitions} <= {*QUEUES, IDLE}
 
 
-def test_the_counters_of_a_group_have_room_for_every_queue_and_for_idle_slots():
-    assert len(QUEUES) + 1 <= layout.QUEUE_LENGTHS_STRIDE
+def test_the_counters_of_a_group_have_room_for_idle_slots_and_twice_for_every_queue():
+    assert 2 * len(QUEUES) + 1 <= layout.QUEUE_LENGTHS_STRIDE
 
 
 def test_contracts_name_values_and_events_that_there_are():
@@ -120,7 +120,18 @@ def cloud(values=GREY, **what):
     return {"type": "heterogeneous", "sigma_t": volume(values), "scale": 3.0, "albedo": 0.8, **what}
 
 
-AOV = ("depth", "normal", "albedo", "position", "lookups", "tentative", "real", "cells", "violations")
+AOV = (
+    "depth",
+    "normal",
+    "albedo",
+    "position",
+    "lookups",
+    "tentative",
+    "real",
+    "cells",
+    "violations",
+    "shadow_rays",
+)
 
 
 def everything():

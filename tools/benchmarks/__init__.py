@@ -1,0 +1,1 @@
+"""What tools/bench.py measures, and with what: scenes, peers, curves, and the tables of its figures."""
