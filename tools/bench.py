@@ -14,16 +14,25 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-import bench_cloud
-import bench_costs
-import bench_pool
-import bench_rays
-import bench_room
-import chromatic
 import click
-from bench_cloud import mitsuba_here
-from bench_options import efficiency_options, json_option, mitsuba_option, rounds_option, size_option
-from bench_tables import Figures, Row, Unavailable, judge, save
+from benchmarks import chromatic
+from benchmarks.cloud import cloud_rows, measure_cloud, mitsuba_here, show_cloud
+from benchmarks.costs import (
+    load_rows,
+    measure_load,
+    measure_memory,
+    measure_startup,
+    memory_rows,
+    show_load,
+    show_memory,
+    show_startup,
+    startup_rows,
+)
+from benchmarks.options import efficiency_options, json_option, mitsuba_option, rounds_option, size_option
+from benchmarks.pool import measure_pool, show_pool
+from benchmarks.rays import EDGE, SIZES, measure_rays, ray_rows, show_rays
+from benchmarks.room import ROOM, measure_room, room_rows, show_room
+from benchmarks.tables import Figures, Row, Unavailable, judge, save
 from folders import SCENES
 from scene_options import choice_options, open_scene
 
@@ -34,12 +43,12 @@ POOL_SIZES = (2048, 8192, 32768)
 Outcome = tuple[Path | None, Figures]
 """What a command returns: the file to write its figures to, and the figures."""
 ROWS: dict[str, Callable[[Figures], list[Row]]] = {
-    "cloud": bench_cloud.cloud_rows,
-    "room": bench_room.room_rows,
-    "rays": bench_rays.ray_rows,
-    "startup": bench_costs.startup_rows,
-    "load": bench_costs.load_rows,
-    "memory": bench_costs.memory_rows,
+    "cloud": cloud_rows,
+    "room": room_rows,
+    "rays": ray_rows,
+    "startup": startup_rows,
+    "load": load_rows,
+    "memory": memory_rows,
     "chromatic": chromatic.chromatic_rows,
 }
 """The table's rows of each command's figures."""
@@ -116,15 +125,15 @@ def beside_mitsuba(
 cloud = beside_mitsuba(
     "cloud",
     CLOUD,
-    bench_cloud.measure_cloud,
-    bench_cloud.show_cloud,
+    measure_cloud,
+    show_cloud,
     "Efficiency beside Mitsuba's, by turns, in CPU time; exit 1 if the pictures differ.",
 )
 room = beside_mitsuba(
     "room",
-    bench_room.ROOM,
-    bench_room.measure_room,
-    bench_room.show_room,
+    ROOM,
+    measure_room,
+    show_room,
     "The same in a room of smoke and glass, and the time of each stage.",
 )
 
@@ -133,7 +142,7 @@ room = beside_mitsuba(
 @click.option(
     "--triangles", type=click.IntRange(min=100), multiple=True, help="Of a mesh, about; repeatable."
 )
-@click.option("--edge", type=click.IntRange(min=1), default=bench_rays.EDGE, help="Its square: the rays.")
+@click.option("--edge", type=click.IntRange(min=1), default=EDGE, help="Its square: the rays.")
 @rounds_option(5)
 @json_option
 def rays(triangles: tuple[int, ...], edge: int, rounds: int, json_path: Path | None) -> Outcome:
@@ -142,8 +151,8 @@ def rays(triangles: tuple[int, ...], edge: int, rounds: int, json_path: Path | N
     Exit 1 if less than 0.999 of the rays hit the same triangle on both sides. Our time is the kernel's,
     Embree's that of its call from Python with the copying of rays and hits.
     """
-    figures = bench_rays.measure_rays(rounds, triangles or bench_rays.SIZES, edge)
-    bench_rays.show_rays(figures)
+    figures = measure_rays(rounds, triangles or SIZES, edge)
+    show_rays(figures)
     return json_path, {"rays": figures}
 
 
@@ -152,8 +161,8 @@ def rays(triangles: tuple[int, ...], edge: int, rounds: int, json_path: Path | N
 @json_option
 def startup(rounds: int, json_path: Path | None) -> Outcome:
     """Time to first pixel of `clvol render`, with cold and with warm kernel caches."""
-    figures = bench_costs.measure_startup(rounds)
-    bench_costs.show_startup(figures)
+    figures = measure_startup(rounds)
+    show_startup(figures)
     return json_path, {"startup": figures}
 
 
@@ -163,8 +172,8 @@ def startup(rounds: int, json_path: Path | None) -> Outcome:
 @json_option
 def load(size: int, rounds: int, json_path: Path | None) -> Outcome:
     """Time to load a grid and build its bricks and majorants."""
-    figures = bench_costs.measure_load(size, rounds)
-    bench_costs.show_load(figures)
+    figures = measure_load(size, rounds)
+    show_load(figures)
     return json_path, {"load": figures}
 
 
@@ -173,8 +182,8 @@ def load(size: int, rounds: int, json_path: Path | None) -> Outcome:
 @json_option
 def memory(size: int, json_path: Path | None) -> Outcome:
     """Peak memory with a large grid, as a multiple of the grid."""
-    figures = bench_costs.measure_memory(size)
-    bench_costs.show_memory(figures)
+    figures = measure_memory(size)
+    show_memory(figures)
     return json_path, {"memory": figures}
 
 
@@ -196,8 +205,8 @@ def pool(
 ) -> Outcome:
     """Time per stage, launches and memory for several pool sizes."""
     opened = open_scene(scene, {}, choices, device)
-    figures = bench_pool.measure_pool(opened, list(sizes or POOL_SIZES), spp, rounds)
-    bench_pool.show_pool(figures)
+    figures = measure_pool(opened, list(sizes or POOL_SIZES), spp, rounds)
+    show_pool(figures)
     return json_path, {"pool": figures}
 
 

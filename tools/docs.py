@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 
 import bench
 import click
-from bench_options import mitsuba_option
-from bench_tables import judge
+from benchmarks.options import mitsuba_option
+from benchmarks.tables import judge
 from docs_tables import ROOT, performance_part, pilot_page, techniques_page, transitions_part
 from documents import between, writable, write
 from pilot import SCENES, pilot_options, tested

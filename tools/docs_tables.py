@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import bench
 import click
-from bench_tables import Figures as Measured
-from bench_tables import markdown, thread_count
+from benchmarks.tables import Figures as Measured
+from benchmarks.tables import markdown, thread_count
 from folders import ROOT
 from pilot import HEADER, HOPELESS, Tested
 

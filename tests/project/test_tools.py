@@ -101,21 +101,25 @@ def test_dump_tells_a_mistake_in_one_line(arguments: list[str], told: str, tmp_p
 def made_up_rounds(tool, deviation: float, cpu: float, spp: int, seed: int, bias: float = 0.0):
     """Eight rounds of 64 x 64 pixels whose single samples have this deviation round 1 + bias."""
     noise = np.random.default_rng(seed).normal(0, deviation / math.sqrt(spp), (8, 64, 64, 1))
-    return tool("efficiency").Rounds(np.repeat(1 + bias + noise, 3, axis=-1), np.full(8, cpu), spp)
+    return tool("benchmarks.efficiency").Rounds(np.repeat(1 + bias + noise, 3, axis=-1), np.full(8, cpu), spp)
 
 
 def test_variance_per_sample_is_the_one_between_rounds_times_spp(tool) -> None:
     images = np.zeros((2, 1, 2, 3))
     images[1, 0, 0] = 2.0  # one pixel is 0 and then 2: variance 2; the other is sure
-    rounds = tool("efficiency").Rounds(images, np.array([1.0, 4.0]), spp=3)
-    np.testing.assert_allclose(tool("efficiency").pixel_variance(rounds), [[6, 0]])
-    np.testing.assert_allclose(tool("efficiency").efficiencies(rounds), [6 / 3, 6 / 12])  # 6 paths a round
+    rounds = tool("benchmarks.efficiency").Rounds(images, np.array([1.0, 4.0]), spp=3)
+    np.testing.assert_allclose(tool("benchmarks.efficiency").pixel_variance(rounds), [[6, 0]])
+    np.testing.assert_allclose(
+        tool("benchmarks.efficiency").efficiencies(rounds), [6 / 3, 6 / 12]
+    )  # 6 paths a round
 
 
 def test_mean_and_its_error_are_those_of_independent_pixels(tool) -> None:
     images = np.zeros((2, 1, 2, 3))
     images[1, 0, 0] = 2.0
-    mean, error = tool("efficiency").image_mean(tool("efficiency").Rounds(images, np.ones(2), 3))
+    mean, error = tool("benchmarks.efficiency").image_mean(
+        tool("benchmarks.efficiency").Rounds(images, np.ones(2), 3)
+    )
     assert mean == 0.5
     assert error == math.sqrt(2 / 2) / 2
 
@@ -123,7 +127,7 @@ def test_mean_and_its_error_are_those_of_independent_pixels(tool) -> None:
 def test_samples_per_round_do_not_change_the_efficiency(tool) -> None:
     few = made_up_rounds(tool, 0.3, cpu=1.0, spp=4, seed=1)
     many = made_up_rounds(tool, 0.3, cpu=25.0, spp=100, seed=2)
-    ratio = tool("efficiency").efficiency_ratio(few, many)
+    ratio = tool("benchmarks.efficiency").efficiency_ratio(few, many)
     assert ratio["low"] < 1 < ratio["high"]
     assert ratio["median"] == pytest.approx(1, abs=0.05)
 
@@ -131,13 +135,13 @@ def test_samples_per_round_do_not_change_the_efficiency(tool) -> None:
 def test_twice_the_noise_at_a_tenth_of_the_time_is_two_and_a_half_times_as_efficient(tool) -> None:
     ours = made_up_rounds(tool, 0.6, cpu=1.0, spp=50, seed=1)
     theirs = made_up_rounds(tool, 0.3, cpu=10.0, spp=50, seed=2)
-    ratio = tool("efficiency").efficiency_ratio(ours, theirs)
+    ratio = tool("benchmarks.efficiency").efficiency_ratio(ours, theirs)
     assert ratio["low"] < 2.5 < ratio["high"]
     assert ratio["high"] - ratio["low"] < 0.4
 
 
 def test_equal_means_agree_and_a_bias_of_one_percent_is_seen(tool) -> None:
-    efficiency = tool("efficiency")
+    efficiency = tool("benchmarks.efficiency")
     mean = efficiency.image_mean(made_up_rounds(tool, 0.3, 1.0, 50, seed=1))
     same = efficiency.image_mean(made_up_rounds(tool, 0.5, 1.0, 20, seed=2))
     biased = efficiency.image_mean(made_up_rounds(tool, 0.5, 1.0, 20, seed=2, bias=0.01))
@@ -148,11 +152,15 @@ def test_equal_means_agree_and_a_bias_of_one_percent_is_seen(tool) -> None:
 
 
 def test_spread_is_median_least_and_greatest(tool) -> None:
-    assert tool("efficiency").spread([3.0, 1.0, 9.0]) == {"median": 3.0, "least": 1.0, "greatest": 9.0}
+    assert tool("benchmarks.efficiency").spread([3.0, 1.0, 9.0]) == {
+        "median": 3.0,
+        "least": 1.0,
+        "greatest": 9.0,
+    }
 
 
 def test_aims_are_met_on_the_right_side_by_every_value(tool) -> None:
-    tables = tool("bench_tables")
+    tables = tool("benchmarks.tables")
     assert (
         tables.at_most("", "", 3.0, " s", 2.9, 3.0).met and not tables.at_most("", "", 3.0, "", 2.9, 3.1).met
     )
@@ -166,7 +174,7 @@ def test_aims_are_met_on_the_right_side_by_every_value(tool) -> None:
 
 @pytest.mark.parametrize("kind", ["cloud_slabs", "noise_slabs"])
 def test_bench_grids_are_seeded_coefficients_that_load(tool, tmp_path: Path, kind: str) -> None:
-    grids, size = tool("big_grids"), 40  # one full slab and a part of one
+    grids, size = tool("benchmarks.big_grids"), 40  # one full slab and a part of one
     for name in ("a", "b"):
         grids.write_npy(tmp_path / f"{name}.npy", getattr(grids, kind)(size), size)
     values = np.load(tmp_path / "a.npy")
@@ -174,7 +182,7 @@ def test_bench_grids_are_seeded_coefficients_that_load(tool, tmp_path: Path, kin
     assert np.isfinite(values).all() and values.min() >= 0 and values.max() <= 1
     assert len(np.unique(values[values > 0])) > 1000
     np.testing.assert_array_equal(values, np.load(tmp_path / "b.npy"))
-    scene = clvol.load_dict(tool("bench_costs").grid_scene(tmp_path / "a.npy", 8))
+    scene = clvol.load_dict(tool("benchmarks.costs").grid_scene(tmp_path / "a.npy", 8))
     assert isinstance(scene.shapes[0].interior.sigma_t, GridVolume)
 
 
@@ -182,7 +190,7 @@ def test_bench_grids_are_seeded_coefficients_that_load(tool, tmp_path: Path, kin
 
 
 def test_embree_is_taken_from_this_python_where_it_is(tool, monkeypatch: pytest.MonkeyPatch) -> None:
-    rays = tool("bench_rays")
+    rays = tool("benchmarks.rays")
     monkeypatch.setattr(rays.importlib.util, "find_spec", lambda name: object())
     assert rays.embree_environment() == {}
 
@@ -190,7 +198,7 @@ def test_embree_is_taken_from_this_python_where_it_is(tool, monkeypatch: pytest.
 def test_a_missing_embree_is_installed_or_told(
     tool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    rays = tool("bench_rays")
+    rays = tool("benchmarks.rays")
     monkeypatch.setattr(rays.importlib.util, "find_spec", lambda name: None)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     failed = subprocess.CompletedProcess([], returncode=1)
@@ -234,7 +242,7 @@ def test_what_cannot_be_measured_is_left_out_and_told(tool, monkeypatch: pytest.
     bench, kept = tool("bench"), planted()["rays"]
 
     def unavailable(*_: object) -> None:
-        raise tool("bench_tables").Unavailable("no Mitsuba here", "give one")
+        raise tool("benchmarks.tables").Unavailable("no Mitsuba here", "give one")
 
     monkeypatch.setattr(bench, "mitsuba_here", unavailable)
     monkeypatch.setattr(bench.rays, "callback", lambda **_: (None, {"rays": kept}))
@@ -247,7 +255,7 @@ def test_what_cannot_be_measured_is_left_out_and_told(tool, monkeypatch: pytest.
 
 
 def test_ray_meshes_are_closed_and_of_the_size_asked_for(tool) -> None:
-    vertices, faces = tool("bench_rays").knobbly_sphere(3000)
+    vertices, faces = tool("benchmarks.rays").knobbly_sphere(3000)
     assert abs(len(faces) - 3000) < 200
     a, b, c = vertices[faces].swapaxes(0, 1)
     assert np.linalg.norm(np.cross(b - a, c - a), axis=1).min() > 0
@@ -293,7 +301,7 @@ def test_a_file_without_its_markers_is_refused_before_measuring(
 def test_all_runs_every_part_in_order_and_hands_mitsuba_on(tool, monkeypatch: pytest.MonkeyPatch) -> None:
     docs, done = tool("docs"), []
     monkeypatch.setattr(docs, "enclosed", lambda path: ("", ""))
-    monkeypatch.setattr(docs.bench.bench_cloud, "has_mitsuba", lambda python: True)
+    monkeypatch.setattr(tool("benchmarks.cloud"), "has_mitsuba", lambda python: True)
     for part in (docs.pictures, docs.profile, docs.techniques, docs.pilot, docs.performance):
         status = 1 if part is docs.pilot else None
         note = lambda *_, part=part, status=status, **options: done.append((part.name, options)) or status  # noqa: E731

@@ -66,7 +66,7 @@ def mitsuba(folder):
     """Images (RUNS, height, width, 3) of independent renders of a scene by Mitsuba."""
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(TOOLS)
-        side = importlib.import_module("mitsuba_side")
+        side = importlib.import_module("benchmarks.mitsuba_side")
     python = side.mitsuba_python(os.environ.get("CLVOL_MITSUBA"))
 
     def render(scene, defaults, spp):

@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import bench_cloud
 import click
 from documents import writable
 from scene_options import choice_options
+
+from benchmarks import cloud
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,7 +41,7 @@ def size_option(default: int) -> Callable:
 
 def check_mitsuba(context: click.Context, parameter: click.Parameter, python: str | None) -> str | None:
     """A Python that was given must have Mitsuba: told before anything is measured."""
-    if python is not None and not bench_cloud.has_mitsuba(python):
+    if python is not None and not cloud.has_mitsuba(python):
         raise click.BadParameter(f"{python} is no Python that can import mitsuba and numpy")
     return python
 

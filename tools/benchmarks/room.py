@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from bench_cloud import Z_LIMIT, agrees, measure_cloud, show_cloud
-from bench_tables import Figures, Row, at_least, ranged, show
 from folders import SCENES
 from scene_options import open_scene
+
+from benchmarks.cloud import Z_LIMIT, agrees, measure_cloud, show_cloud
+from benchmarks.tables import Figures, Row, at_least, ranged, show
 
 ROOM = str(SCENES / "room.xml")
 EFFICIENCY_TARGET = 5.0

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from bench_tables import Figures, ranged, show
-from efficiency import spread
+from benchmarks.efficiency import spread
+from benchmarks.tables import Figures, ranged, show
 
 if TYPE_CHECKING:
     from scene_options import OpenScene

@@ -10,13 +10,14 @@ import time
 from pathlib import Path
 from typing import Any
 
-import big_grids
 import click
-from bench_tables import Figures, Row, at_most, ranged, show
-from efficiency import spread
 from folders import SCENES
 
 import clvol
+from benchmarks import big_grids
+from benchmarks.efficiency import spread
+from benchmarks.processes import output_of
+from benchmarks.tables import Figures, Row, at_most, ranged, show
 from clvol.tables.prepare import prepare
 
 COLD_TARGET, WARM_TARGET, LOAD_TARGET = 15.0, 3.0, 3.0
@@ -154,9 +155,7 @@ def measure_memory(size: int) -> Figures:
         with tempfile.TemporaryDirectory(prefix="clvol-bench-") as folder:
             path = Path(folder, "grid.npy")
             big_grids.write_npy(path, slabs(edge), edge)
-            command = [sys.executable, __file__, str(path)]
-            output = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
-            peaks[kind] = {"grid": 4 * edge**3, "peak": int(output)}
+            peaks[kind] = {"grid": 4 * edge**3, "peak": int(output_of("costs", str(path)))}
     return {"size": size} | peaks
 
 

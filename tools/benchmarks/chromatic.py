@@ -12,11 +12,11 @@ from dataclasses import replace
 
 import click
 import numpy as np
-from bench_tables import Figures, Row, ranged, thread_count
-from efficiency import Rounds, efficiency_ratio, image_mean, pixel_variance, z_score
 from folders import SCENES
 from scene_options import OpenScene
 
+from benchmarks.efficiency import Rounds, efficiency_ratio, image_mean, pixel_variance, z_score
+from benchmarks.tables import Figures, Row, ranged, thread_count
 from clvol.cli.options import device_option
 from clvol.device.device import open_device
 from clvol.planning.choices import Choices
@@ -140,7 +140,3 @@ def main(
     figures = measure_chromatic(res, spp, rounds, technique, device)
     show_chromatic(figures)
     return None, {"chromatic": figures}
-
-
-if __name__ == "__main__":
-    main()

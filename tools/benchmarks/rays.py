@@ -1,7 +1,5 @@
 """Rays per second on one thread, closest hit, beside Embree (through embreex), and what the hierarchy costs.
 
-    python tools/bench_rays.py          installs embreex in a cache where there is none
-
 Both sides trace the same rays through the same mesh by turns.  They are not timed quite alike: ours is the
 kernel's time by the device's clock, with rays and hits in the device's memory; Embree's is that of the one
 Python call that traces them all, one rtcIntersect1 a ray, and so counts about 5 microseconds for the call and
@@ -25,11 +23,12 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 import pyopencl as cl
-from bench_costs import peak_bytes
-from bench_tables import Figures, Row, Unavailable, at_least, judge, ranged, show
-from efficiency import spread
 from folders import cached
 
+from benchmarks.costs import peak_bytes
+from benchmarks.efficiency import spread
+from benchmarks.processes import output_of
+from benchmarks.tables import Figures, Row, Unavailable, at_least, judge, ranged, show
 from clvol.accel.bvh import Bvh, build_bvh
 from clvol.device import programs
 from clvol.device.device import Device, open_device
@@ -207,11 +206,10 @@ def measure_rays(rounds: int, sizes: Sequence[int] = SIZES, edge: int = EDGE) ->
 
     Raises Unavailable where there is no embreex.
     """
-    one_thread = os.environ | embree_environment() | {"POCL_MAX_PTHREAD_COUNT": "1"}
+    one_thread = embree_environment() | {"POCL_MAX_PTHREAD_COUNT": "1"}
     figures = {}
     for name, arguments in (("build", [max(sizes)]), ("rates", [rounds, sizes, edge])):
-        command = [sys.executable, __file__, name, json.dumps(arguments)]
-        output = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, env=one_thread).stdout
+        output = output_of("rays", name, json.dumps(arguments), environment=one_thread)
         figures[name] = json.loads(output)
     return figures
 

@@ -7,11 +7,19 @@ import time
 from pathlib import Path
 
 import numpy as np
-from bench_tables import Figures, Row, Unavailable, at_least, ranged, show, thread_count
-from efficiency import Rounds, efficiencies, efficiency_ratio, image_mean, pixel_variance, spread, z_score
-from mitsuba_side import REQUIREMENT, MitsubaSide, mitsuba_python
 from scene_options import open_scene
 
+from benchmarks.efficiency import (
+    Rounds,
+    efficiencies,
+    efficiency_ratio,
+    image_mean,
+    pixel_variance,
+    spread,
+    z_score,
+)
+from benchmarks.mitsuba_side import REQUIREMENT, MitsubaSide, mitsuba_python
+from benchmarks.tables import Figures, Row, Unavailable, at_least, ranged, show, thread_count
 from clvol.version import __version__
 
 EFFICIENCY_TARGET = 8.0
