@@ -72,7 +72,9 @@ CASES = {
         SQUARE,
         {"technique": "delta", "transmittance": "ratio", "majorant": "grid", "lookup": "stochastic"},
     ),
-    "cloud, marching": Case("cloud", SQUARE, {"technique": "marching", "transmittance": "marching"}),
+    "cloud, marching": Case(
+        "cloud", SQUARE, {"technique": "marching", "transmittance": "marching", "sampler": "sobol"}
+    ),
     "smoke": Case("smoke", SIDES, {"technique": "spectral", "transmittance": "ratio", "majorant": "grid"}),
     "smoke, regular": Case(
         "smoke", SIDES, {"technique": "regular", "transmittance": "regular", "majorant": "kdtree"}

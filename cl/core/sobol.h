@@ -1,9 +1,12 @@
-/* Sampler "sobol": each block of decisions takes its numbers from a Sobol' sequence in four dimensions, with a
-   pixel's samples in an order of its own and Owen-scrambled anew (clvol/tables/sobol.py), so that samples cover each
-   decision evenly.
+/* Samplers "sobol" and "joint": each block of decisions takes its numbers from a Sobol' sequence in four dimensions,
+   with a pixel's samples in an order of its own and Owen-scrambled anew (clvol/tables/sobol.py), so that samples cover
+   each decision evenly.
 
    Every number alone is exactly uniform and independent of the others of its path: no mean changes.
-   Samples of one randomisation depend on each other; randomisations do not (clvol/picture/estimate.py). */
+   A pixel's samples are dealt in turn to parts, whose scatter says how large the error is (clvol/picture/estimate.py).
+   With "sobol" each part is scrambled on its own: a part's samples depend on each other, parts do not.  With "joint"
+   the parts are pieces of one scrambled sequence: together they cover decisions as evenly as one part of as many
+   samples would. */
 #ifndef CLVOL_CORE_SOBOL_H
 #define CLVOL_CORE_SOBOL_H
 #include "core/random.h"
@@ -52,15 +55,22 @@ INLINE uint4 sobol_point(const Scene *scene, uint index)
     return point;
 }
 
+/* Which of the four points of a turn a part takes: one of three orders, so that two blocks pair the halves of their
+   numbers in different ways twice out of three times. */
+INLINE uint part_in_turn(uint part, uint hash) { return (0x9C78E4u >> (8u * (hash % 3u) + 2u * part)) & 3u; }
+
 /* Four numbered dimensions, full 32-bit.  `segment` tells apart the walks of one bounce. */
 INLINE uint4 decision_block(const Scene *scene, SampleKey key, uint block, uint segment)
 {
     const uint2 seed = (uint2)(scene->render->seed[0], scene->render->seed[1]);
-    const uint randomization = key.sample % CLVOL_RANDOMIZATIONS, index = key.sample / CLVOL_RANDOMIZATIONS;
+    const uint part = key.sample % CLVOL_RANDOMIZATIONS, index = key.sample / CLVOL_RANDOMIZATIONS;
+    const uint randomization = CLVOL_JOINT ? 0u : part;
     const uint number = block_number(key, block);
     const uint place = mixed_bits(number ^ (segment << 16) ^ mixed_bits(seed.x ^ mixed_bits(seed.y ^ randomization)));
-    const uint order = reverse_bits(owen_scramble(reverse_bits(index), mixed_bits(key.pixel ^ place)));
-    uint4 point = sobol_point(scene, (order & SOBOL_SHUFFLED) | (index & ~SOBOL_SHUFFLED));
+    const uint hash = mixed_bits(key.pixel ^ place);
+    const uint order = reverse_bits(owen_scramble(reverse_bits(index), hash));
+    const uint turn = (order & SOBOL_SHUFFLED) | (index & ~SOBOL_SHUFFLED);
+    uint4 point = sobol_point(scene, CLVOL_JOINT ? turn * CLVOL_RANDOMIZATIONS + part_in_turn(part, hash) : turn);
     if (block == BLOCK_LIGHT || block == BLOCK_SURFACE)
         point = point.zxyw; /* the best pair is for a light's point, or the direction */
     const uint4 scramble = philox4x32((uint4)(key.pixel, randomization, number, segment), seed);

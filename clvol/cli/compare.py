@@ -62,13 +62,13 @@ def _names_options(command: F) -> F:
     "time_limit",
     metavar="SECONDS",
     help="About the seconds that each combination renders for, over all rounds; 10 by default; with sampler "
-    "sobol the nearest that a power of two of samples allows. The reference takes about ten times as long as "
-    "one of them.",
+    "sobol or joint the nearest that a power of two of samples allows. The reference takes about ten times "
+    "as long as one of them.",
 )
 @click.option(
     "--spp",
     type=click.IntRange(min=1),
-    help="Samples per pixel of one round instead; a power of two suits sampler sobol.",
+    help="Samples per pixel of one round instead; a power of two suits samplers sobol and joint.",
 )
 @click.option(
     "--rounds",

@@ -2,7 +2,9 @@
 
 Independent samples leave their sum and that of their squares.  Low-discrepancy samples depend on each other,
 so that their squares say nothing of the mean's error: they are drawn in several independent randomisations,
-whose sums are kept apart (Owen 1997, "Monte Carlo variance of scrambled net quadrature", section 3).
+whose sums are kept apart (Owen 1997, "Monte Carlo variance of scrambled net quadrature", section 3).  Where
+these are parts of one sequence (sampler joint) they vary more than their mean lets expect, as strata do: the
+variance found is then too large by minus the mean covariance of two parts.
 """
 
 from __future__ import annotations

@@ -61,7 +61,8 @@ class Result:
         Mean linear radiance.
     variance : float32 (height, width, 3)
         Variance of that mean, per pixel; inf after a single sample.  It has `dof` degrees of freedom: with
-        sampler sobol that of a single pixel is rough, sums over tiles and the image are good.
+        samplers sobol and joint that of a single pixel is rough, sums over tiles and the image are good; with
+        joint they are somewhat too large on the mean.
     stats : dict
         What it cost and what went wrong on the way: seconds by stage, paths, look-ups, violations, …
     aovs : dict of str to array (height, width) or (height, width, channels)

@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from clvol.planning.names import Names
+from clvol.planning.registry import SAMPLERS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from clvol.planning.features import Features
 
-DEFAULT_SAMPLER = "sobol"
+DEFAULT_SAMPLER = "joint"
 OWN = "the scene's own"
 """The reason of a name that the scene's integrator gives."""
 UNSETTLED = "auto"
@@ -55,6 +56,7 @@ def resolve(
 
 
 _SAMPLERS = {
+    "joint": "all samples of a pixel together cover every decision evenly",
     "sobol": "samples that cover every decision evenly",
     "independent": "every number is independent of all others",
 }
@@ -72,7 +74,7 @@ def _technique(features: Features, asked: Mapping[str, str]) -> tuple[str, str]:
         "not every medium emits with an albedo of at most 0.5": not features.only_dark_emitters,
         "media may overlap": features.media_overlap,
         "channels are attenuated differently": features.chromatic_extinction,
-        "samples are independent": sampler != "sobol",
+        "samples are independent": not SAMPLERS[sampler].low_discrepancy,
         "look-ups are stochastic": asked["lookup"] == "stochastic",
     }
     against = [reason for reason, holds in hurdles.items() if holds]

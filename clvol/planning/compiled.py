@@ -87,6 +87,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_FIRST_HIT": int(bool(plan.first_hit)),
         **{f"CLVOL_SHOWS_{name.upper()}": int(name in plan.shown) for name in registry.AOVS},
         "CLVOL_RANDOMIZATIONS": plan.randomizations,
+        "CLVOL_JOINT": int(plan.chosen["sampler"] == "joint"),
         "CLVOL_PIXEL_LIST": int(plan.pixel_list),
         "CLVOL_NEE": int(plan.nee),
         "CLVOL_MIS": int(plan.mis),

@@ -148,8 +148,8 @@ class Decisions:
 
     @property
     def randomizations(self) -> int:
-        """Independent randomisations that the samples are dealt to; 0 where every sample is independent."""
-        return layout.RANDOMIZATIONS if self.chosen["sampler"] == "sobol" else 0
+        """Parts that a pixel's samples are dealt to; 0 where every sample is independent."""
+        return layout.RANDOMIZATIONS if registry.SAMPLERS[self.chosen["sampler"]].low_discrepancy else 0
 
     @property
     def pixel_list(self) -> bool:

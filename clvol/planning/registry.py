@@ -28,6 +28,7 @@ class Choice:
     walks_majorant : it walks majorant cells at all.
     linear : it uses the density of a look-up once and linearly, so that a stochastic look-up may replace it.
     biased : its pictures are labelled as biased.
+    low_discrepancy : a pixel's samples depend on each other, and are dealt to parts that tell their error.
     """
 
     summary: str
@@ -39,6 +40,7 @@ class Choice:
     walks_majorant: bool = True
     linear: bool = True
     biased: bool = False
+    low_discrepancy: bool = False
 
 
 TECHNIQUES = {
@@ -142,8 +144,14 @@ CONTROLS = {
 SAMPLERS = {
     "independent": Choice("every number independent of all others", "core/independent.h"),
     "sobol": Choice(
-        "an Owen-scrambled Sobol' sequence for each pixel: samples that cover every decision evenly",
+        "Owen-scrambled Sobol' sequences, four for each pixel: samples that cover every decision evenly",
         "core/sobol.h",
+        low_discrepancy=True,
+    ),
+    "joint": Choice(
+        "one Owen-scrambled Sobol' sequence for each pixel, in four parts: still more even, errors overrated",
+        "core/sobol.h",
+        low_discrepancy=True,
     ),
 }
 

@@ -33,7 +33,7 @@ def upload_scene(device: Device, prepared: PreparedScene) -> dict[str, cl.Buffer
     buffers: dict[str, cl.Buffer] = {}
     needed = {argument.name for argument in layout.arguments(prepared.plan.macros)}
     if "sobol" in needed:
-        buffers["sobol"] = _buffer(device, block_table())
+        buffers["sobol"] = _buffer(device, block_table(bool(prepared.plan.macros["CLVOL_JOINT"])))
     if "volumes" in needed:
         buffers |= _volume_buffers(device, prepared)
     if "media" in needed:

@@ -31,7 +31,7 @@ def scene():
 
 def rendered(described, **options):
     """With the sampler that users get."""
-    return clvol.render(described, sampler="sobol", **options)
+    return clvol.render(described, sampler="joint", **options)
 
 
 def digest(result):

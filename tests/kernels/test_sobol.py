@@ -1,4 +1,4 @@
-"""Sampler sobol: its sequence against scipy's, its numbers on the device, its pictures against independent.
+"""Samplers sobol and joint: their sequences, their numbers on the device, their pictures against independent.
 
 χ² tests have a false-alarm rate of 1e-4 each and use fixed seeds; what scrambling must keep is exact.
 """
@@ -19,17 +19,17 @@ from clvol.scene.records import ConstantEmitter, Shape
 from clvol.tables import sobol
 
 CAMERA, WALK, LIGHT, DIRECTION, SHADOW, SURFACE = range(6)
-COLUMNS = sobol.direction_numbers()
+COLUMNS = {name: sobol.direction_numbers(name == "joint") for name in ("sobol", "joint")}
 
 
 # -- the sequence ----------------------------------------------------------------------------------
 
 
-def numbers(dimension, index):
+def numbers(dimension, index, sampler="sobol"):
     """Numbers of the sequence in its natural order, uint32."""
     index = np.asarray(index, np.uint32)
     found = np.zeros(index.shape, np.uint32)
-    for bit, column in enumerate(COLUMNS[dimension]):
+    for bit, column in enumerate(COLUMNS[sampler][dimension]):
         found ^= np.where(index >> np.uint32(bit) & 1, column, np.uint32(0)).astype(np.uint32)
     return found
 
@@ -41,8 +41,8 @@ def test_direction_numbers_are_those_of_scipy():
     for k in range(21):
         engine.fast_forward(2**k - engine.num_generated)
         (found,) = (engine.random(1) * 2**32).astype(np.uint32)
-        assert (found == COLUMNS[:, k] ^ before).all()
-        before = COLUMNS[:, k]
+        assert (found == COLUMNS["sobol"][:, k] ^ before).all()
+        before = COLUMNS["sobol"][:, k]
 
 
 @pytest.fixture(scope="module")
@@ -50,11 +50,23 @@ def probe(device):
     return Probe(device, scene_of(medium_of(1.0, albedo=0.5)), sampler="sobol")
 
 
-def test_the_device_has_the_same_sequence(probe):
+@pytest.fixture(scope="module")
+def joint(device):
+    return Probe(device, scene_of(medium_of(1.0, albedo=0.5)), sampler="joint")
+
+
+@pytest.fixture(scope="module", params=["sobol", "joint"])
+def either(request):
+    return request.getfixturevalue({"sobol": "probe", "joint": "joint"}[request.param])
+
+
+@pytest.mark.parametrize(("fixture", "sampler"), [("probe", "sobol"), ("joint", "joint")])
+def test_the_device_has_the_same_sequence(request, fixture, sampler):
+    probe = request.getfixturevalue(fixture)
     index = np.r_[0, 1, 2, 2**30, 2**32 - 1, np.random.default_rng(1).integers(0, 2**32, 999)]
     out = np.zeros((len(index), 4), np.uint32)
     probe.run([], "vstore4(sobol_point(scene, in0[i]), i, out0);", [out], [index.astype(np.uint32)])
-    expected = [sobol.reverse_bits(numbers(d, index)) for d in range(4)]
+    expected = [sobol.reverse_bits(numbers(d, index, sampler)) for d in range(4)]
     assert (out == np.stack(expected, axis=1)).all()
 
 
@@ -75,9 +87,9 @@ def blocks(probe, pixel=0, sample=0, bounce=0, block=CAMERA, segment=0):
     return out.reshape(*keys[0].shape, 4)
 
 
-def of_one(randomization, count, first=0):
-    """The samples of one randomisation, from number `first` of its own on."""
-    return randomization + sobol.RANDOMIZATIONS * (first + np.arange(count, dtype=np.int64))
+def of_one(part, count, first=0):
+    """The samples of one part, from number `first` of its own on."""
+    return part + sobol.RANDOMIZATIONS * (first + np.arange(count, dtype=np.int64))
 
 
 PLACES = [
@@ -107,10 +119,10 @@ def p_values(one, other, bins=16):
     return found + [uniform_p_value(bins * a[:, m] + b[:, n], bins * bins) for m, n in pairs]
 
 
-def test_a_sample_is_uniform_over_pixels_and_its_blocks_are_independent(probe):
+def test_a_sample_is_uniform_over_pixels_and_its_blocks_are_independent(either):
     found = []
     for sample in (0, 7, 4 * 1023 + 2, 2**32 - 1):
-        drawn = [blocks(probe, PIXELS, sample, **place) for place in PLACES]
+        drawn = [blocks(either, PIXELS, sample, **place) for place in PLACES]
         found += [p for d in drawn for p in p_values(d, d)]
         found += [p for one, other in pairwise(drawn) for p in p_values(one, other)]
     assert min(found) * len(found) > FALSE_ALARM
@@ -135,13 +147,13 @@ def test_randomisations_are_scrambled_apart_and_not_only_in_another_order(probe)
         assert len(np.intersect1d(one, other)) < 20  # by chance 4096²/2^32
 
 
-def test_blocks_never_share_their_numbers(probe):
+def test_blocks_never_share_their_numbers(either):
     """Pixel, sample, bounce, block, segment and seed all tell them apart."""
     grid = np.meshgrid([0, 1, 2], [0, 1, 4], [1, 2, 3, 9], range(6), [0, 1, 2**16])
     found = []
     for seed in (3, 3 + 2**32, 9):
-        probe.upload(seed)
-        found.append(blocks(probe, *grid).reshape(-1, 4))
+        either.upload(seed)
+        found.append(blocks(either, *grid).reshape(-1, 4))
     assert len(np.unique(np.concatenate(found), axis=0)) == sum(map(len, found))
 
 
@@ -158,18 +170,29 @@ def best(place):
     return [1, 2] if place["block"] in (LIGHT, SURFACE) else [0, 1]
 
 
-@pytest.mark.parametrize("first", [0, 512 * 77, 2**30 - 2**20])
-def test_samples_of_a_randomisation_take_a_stratum_each(probe, first):
+def assert_a_stratum_each(drawn, place, least=0):
     """2^k of them in every dimension, and in all elementary intervals of the two that matter most."""
-    probe.upload()
+    for k in range(least, 10):
+        for run in drawn.reshape(-1, 2**k, 4)[:2]:
+            for d in range(4):
+                assert len(np.unique(cells(run[:, [d]], [k]))) == 2**k, (place, k, d)
+            for a in range(k + 1):
+                assert len(np.unique(cells(run[:, best(place)], [a, k - a]))) == 2**k, (place, k, a)
+
+
+@pytest.mark.parametrize("first", [0, 512 * 77, 2**30 - 2**20])
+def test_samples_of_a_part_take_a_stratum_each(either, first):
+    either.upload()
     for place in PLACES:
-        drawn = blocks(probe, 5, of_one(2, 512, first), **place)
-        for k in range(10):
-            for run in drawn.reshape(-1, 2**k, 4)[:2]:
-                for d in range(4):
-                    assert len(np.unique(cells(run[:, [d]], [k]))) == 2**k, (place, k, d)
-                for a in range(k + 1):
-                    assert len(np.unique(cells(run[:, best(place)], [a, k - a]))) == 2**k, (place, k, a)
+        assert_a_stratum_each(blocks(either, 5, of_one(2, 512, first), **place), place)
+
+
+@pytest.mark.parametrize("first", [0, 4 * 128 * 77, 2**32 - 2**20])
+def test_all_parts_of_a_joint_sequence_together_take_a_stratum_each(joint, first):
+    joint.upload()
+    for place in PLACES:
+        drawn = blocks(joint, 5, first + np.arange(512, dtype=np.int64), **place)
+        assert_a_stratum_each(drawn, place, least=2)  # as many as there are parts
 
 
 def imbalance(one, other):
@@ -197,6 +220,18 @@ def test_decisions_of_different_blocks_meet_at_random(probe, count):
             assert imbalance(one[..., m], other[..., n]) < 2 * (1 + 6 * error)
     in_order = numbers(0, np.arange(count)) ^ np.uint32(2**31) * (pixels % 2).astype(np.uint32)
     assert imbalance(in_order, np.broadcast_to(numbers(0, np.arange(count)), in_order.shape)) > count / 2
+
+
+@pytest.mark.parametrize("count", [4, 16, 64])
+def test_decisions_of_different_blocks_meet_at_random_in_all_parts_together(joint, count):
+    """Once in three times the halves of two numbers are paired alike for eight samples, else evenly."""
+    joint.upload()
+    pixels = np.arange(1500)[:, None]
+    drawn = [blocks(joint, pixels, np.arange(count), **place) for place in PLACES]
+    error = np.sqrt(8 / pixels.size)  # kurtosis 9: a normal number once in three times, else 0
+    for one, other in combinations(drawn, 2):
+        for m, n in np.ndindex(4, 4):
+            assert imbalance(one[..., m], other[..., n]) < 8 / 3 * (1 + 6 * error)
 
 
 # -- pictures ----------------------------------------------------------------------------------------
@@ -228,13 +263,13 @@ SCENES = {
 
 
 @pytest.mark.contract
-@pytest.mark.parametrize("name", SCENES)
-def test_pictures_have_the_mean_of_independent_samples(name):
+@pytest.mark.parametrize(("name", "sampler"), [("lace", "sobol"), ("lace", "joint"), ("chromatic", "joint")])
+def test_pictures_have_the_mean_of_independent_samples(name, sampler):
     """Image mean and tiles; a difference of 0.5 % of the mean would be seen."""
     scene, technique, spp = SCENES[name]
     pair = [
-        clvol.render(scene, spp=n, seed=seed, sampler=sampler, technique=technique, transmittance="ratio")
-        for n, seed, sampler in zip(spp, (1, 2), ("independent", "sobol"), strict=True)
+        clvol.render(scene, spp=n, seed=seed, sampler=used, technique=technique, transmittance="ratio")
+        for n, seed, used in zip(spp, (1, 2), ("independent", sampler), strict=True)
     ]
     assert_same_picture(*pair)
     (mean, variance), (_, other) = (image_mean(r) for r in pair)

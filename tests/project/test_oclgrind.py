@@ -78,5 +78,5 @@ def test_every_choice_and_every_scene_is_rendered(oclgrind: ModuleType) -> None:
     cases = oclgrind.CASES.values()
     for family in ("technique", "transmittance", "majorant", "sampler"):
         named = {case.options.get(family) for case in cases}
-        assert set(registry.FAMILIES[family]) - named <= {"none", "sobol"}, family
+        assert set(registry.FAMILIES[family]) - named <= {"none", "joint"}, family
     assert {case.scene for case in cases} - {""} == {path.stem for path in SCENES.glob("*.xml")}

@@ -89,14 +89,14 @@ def test_one_and_two_threads_give_the_same_bits(whole):
     assert digests == {digest(whole)}
 
 
-def test_sobol_is_what_users_get(tmp_path):
+def test_joint_is_what_users_get(tmp_path):
     """In a process of its own: the tests' default is another (conftest.py)."""
     scene, saved = SCENES / "slab.xml", tmp_path / "a.exr"
     options = ["-o", str(saved), "--spp", "1", "-D", "res=8"]
     command = [sys.executable, "-m", "clvol.cli.main", "render", str(scene), *options]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
-    assert ImageInput.open(str(saved)).spec().get_string_attribute("sampler") == "sobol"
+    assert ImageInput.open(str(saved)).spec().get_string_attribute("sampler") == "joint"
 
 
 @pytest.mark.parametrize("cut", [SPP // 2, 337, 1])

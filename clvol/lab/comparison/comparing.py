@@ -59,9 +59,9 @@ def compare(
         From `load_file` or `load_dict`.
     time_limit
         About the seconds that each combination renders for, over all its rounds. The default is 10. With
-        sampler sobol it is the nearest that a power of two of samples allows. The reference takes about ten
-        times as long as one combination, unless it is given. Renders with fewer samples take a third as
-        long.
+        sampler sobol or joint it is the nearest that a power of two of samples allows. The reference takes
+        about ten times as long as one combination, unless it is given. Renders with fewer samples take a
+        third as long.
     spp
         Samples per pixel of one round instead, the same for all.
     rounds

@@ -51,7 +51,7 @@ class Curve:
 class Efficiency:
     """1 / (MSE · cost) of the mean of all rounds, precomputation counted where cost is seconds.
 
-    It holds for renders of as many samples as a round: those of sampler sobol gain with their number.
+    It holds for renders of as many samples as a round: samplers sobol and joint gain with their number.
 
     Parameters
     ----------

@@ -116,8 +116,8 @@ def _summary(findings: Findings) -> str:
     note = (
         f"Relative RMSE and largest error: of the mean of all rounds; relative to F² + ({DARK:g} · mean F)², "
         "F being the reference, whose own variance is subtracted. Efficiency: times the baseline's, with its "
-        "95 % interval, for renders of as many samples as the table says (sampler sobol gains with their "
-        f"number); * significantly different. Verdicts raise a false alarm with probability {ALPHA:g}."
+        "95 % interval, for renders of as many samples as the table says (samplers sobol and joint gain with "
+        f"their number); * significantly different. Verdicts raise a false alarm with probability {ALPHA:g}."
     )
     return _table(*table_rows(findings)) + f'<p class="note">{escape(note)}</p>'
 

@@ -21,6 +21,7 @@ from clvol.lab.efficiency import LEAST_ROUNDS
 from clvol.lab.quiet import log_filter
 from clvol.lab.seeds import seeds_from
 from clvol.lab.trials import Trial, rounds
+from clvol.planning.registry import SAMPLERS
 
 if TYPE_CHECKING:
     from clvol.lab.comparison.combine import Lineup
@@ -42,7 +43,7 @@ class Effort:
     ----------
     rounds : of every combination.
     seconds : that each combination renders for, over all its rounds; the reference and shorter renders apart.
-        With sampler sobol it is what comes nearest with a power of two of samples.
+        With samplers sobol and joint it is what comes nearest with a power of two of samples.
     spp : samples per pixel of one round instead, for all alike.
     reference_spp : samples per pixel of the reference; None takes `REFERENCE_SAMPLES` times those of all
         rounds of the combination that it is made with.
@@ -209,17 +210,18 @@ def _rounds(running: list[_Entrant], count: int, seeds: Iterator[int]) -> tuple[
 def _samples(wanted: float, lineup: Lineup) -> int:
     """Samples of a render, at least 1.
 
-    Where sampler sobol takes part, a power of two from 4 on for all: others cost it some of its gain.
+    Where sampler sobol or joint takes part, a power of two from 4 on for all: others cost some of the gain.
     """
-    if any(uses_sobol(trial) for trial in lineup.trials.values()):
+    if any(is_low_discrepancy(trial) for trial in lineup.trials.values()):
         below = 1 << max(2, math.floor(math.log2(max(wanted, 1.0))))
         return below if wanted < 1.5 * below else 2 * below
     return max(1, round(wanted))
 
 
-def uses_sobol(trial: Trial) -> bool:
+def is_low_discrepancy(trial: Trial) -> bool:
     """Whether the number of samples matters to its efficiency."""
-    return trial.names.get("sampler") == "sobol"
+    sampler = SAMPLERS.get(trial.names.get("sampler", ""))
+    return sampler is not None and sampler.low_discrepancy
 
 
 def _reference_entrant(

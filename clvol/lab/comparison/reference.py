@@ -140,7 +140,7 @@ def _count(value: Any) -> int | None:
 
 
 def _freedom(metadata: dict[str, object]) -> int:
-    """Degrees of freedom of the variance: few where sampler sobol rendered it."""
+    """Degrees of freedom of the variance: few where sampler sobol or joint rendered it."""
     return min(_count(metadata.get("dof")) or _MANY, _MANY)
 
 

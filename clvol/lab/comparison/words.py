@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from clvol.lab.comparison.figures import ALPHA, COSTS, LEVEL, Efficiency, Figures
-from clvol.lab.comparison.measure import uses_sobol
+from clvol.lab.comparison.measure import is_low_discrepancy
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -173,7 +173,7 @@ def _warnings(findings: Findings) -> Iterator[str]:
                 "and is less for longer ones."
             )
         spp = figures.measured.spp
-        if uses_sobol(figures.measured.trial) and (spp < 4 or spp & (spp - 1)):
+        if is_low_discrepancy(figures.measured.trial) and (spp < 4 or spp & (spp - 1)):
             yield (
                 f"{figures.label} draws from Sobol' sequences, whose gain is full at 4, 8, 16, … samples a "
                 f"render; it has {spp}."
