@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("clvol")
 _NEXT_JOB, _JOB_LIMIT, _NON_FINITE, _DONE = (layout.enum("COUNTER", n) for n in layout.ENUMS["COUNTER"])
+_LEAST_PASSES = 4
+"""In flight together, however many jobs they hold."""
 _MAX_ROUND_JOBS = 1 << 31
 _HARVEST_SECONDS = 2.0
 """Statistics of the slots are collected at least this often: their 32-bit counters must not run over."""
@@ -46,22 +48,25 @@ _FIRST_PATIENCE_SECONDS = 30.0
 
 @dataclass(frozen=True)
 class Pool:
-    """How many paths are in flight and how many jobs a pass holds (at least one sample per pixel)."""
+    """How many paths are in flight, how many jobs a pass holds (at least one sample per pixel), and the ring.
+
+    On a processor more slots take as long or longer, and fewer take more waves, each with its launches.
+    """
 
     slots: int
     pass_jobs: int
-    ring_passes: int = 4
+    ring_jobs: int
 
     @classmethod
     def for_device(cls, device: Device, plan: Plan, slots: int | None = None) -> Pool:
         """Pool for a device; `slots` is rounded up to whole groups."""
         if slots is None:
-            slots = 8192 if device.is_cpu else 1 << 20
+            slots = 1 << 15 if device.is_cpu else 1 << 20
         if not 1 <= slots <= 1 << 26:
             raise OptionError(f"a pool of {slots} paths", hint="give 1 to 67108864")
         groups = max(1, -(-slots // plan.tuning.group_slots))
         slots = groups * plan.tuning.group_slots
-        return cls(slots, pass_jobs=4 * slots)
+        return cls(slots, pass_jobs=2 * slots, ring_jobs=16 * slots)
 
 
 @dataclass
@@ -112,13 +117,15 @@ class Wavefront:
 
     def _allocate(self, scene_buffers: dict[str, cl.Buffer]) -> None:
         # of fewer pixels a pass may hold more jobs than of all, though not more than this
-        ring_jobs = max(self.pool.pass_jobs, self.sample_jobs) * self.pool.ring_passes
+        most_jobs = max(self.pool.pass_jobs, self.sample_jobs)
+        self.ring_passes = max(_LEAST_PASSES, self.pool.ring_jobs // most_jobs)
+        ring_jobs = most_jobs * self.ring_passes
         sizes = {
             "render": self.render.nbytes,
             "state": 4 * len(self.fields) * self.stride,
             "queues": 4 * len(layout.QUEUES) * self.pool.slots,
             "queue_lengths": 4 * layout.QUEUE_LENGTHS_STRIDE * self.groups,
-            "counters": 4 * (_DONE + self.pool.ring_passes),
+            "counters": 4 * (_DONE + self.ring_passes),
             "results": 4 * self.plan.channels * ring_jobs // self.plan.jobs_per_sample,
         }
         if self.film.firsts:
@@ -132,7 +139,7 @@ class Wavefront:
         state = np.zeros((len(self.fields), self.stride), np.uint32)
         state[[f.name for f in self.fields].index("job")] = layout.NO_JOB
         self._write("state", state)
-        self._write("counters", np.zeros(_DONE + self.pool.ring_passes, np.uint32))
+        self._write("counters", np.zeros(_DONE + self.ring_passes, np.uint32))
         self._write("queue_lengths", self.handled.all_idle(self.plan.tuning.group_slots))
         values = scene_arguments(self.plan.macros, self.buffers, self.stride)
         for stage in self.plan.stages:
@@ -143,7 +150,7 @@ class Wavefront:
         """Forget every sample and what was counted; the next run draws the random numbers of another seed."""
         self._harvest()
         self.film.clear(seed)
-        self._write("counters", np.zeros(_DONE + self.pool.ring_passes, np.uint32))
+        self._write("counters", np.zeros(_DONE + self.ring_passes, np.uint32))
         self._reset_clocks()
 
     def new_film(self, seed: tuple[int, int]) -> Film:
@@ -239,18 +246,17 @@ class Wavefront:
         waves = 1
         while True:
             urgency = should_stop() if begun else 0
-            allowed = begun if urgency else min(passes, finished + self.pool.ring_passes)
+            allowed = begun if urgency else min(passes, finished + self.ring_passes)
             limit = sum(samples[:allowed]) * self.sample_jobs
-            self._write("counters", np.array([limit], np.uint32), 4 * _JOB_LIMIT)
+            self._allow(limit)
             with timed(self.profiler, "waves"):
-                launched, elapsed = self._launch(waves)
+                launched, elapsed, counters = self._launch(waves)
             waves = int(np.clip(launched * _BATCH_SECONDS / max(elapsed, 1e-6), 1, max(2 * launched, 4)))
             if time.perf_counter() - self._harvested > _HARVEST_SECONDS:
                 self._harvest()
-            counters = self._read_counters()
             begun = min(allowed, -(-int(counters[_NEXT_JOB]) // pass_jobs))
             while finished < begun:
-                place = finished % self.pool.ring_passes
+                place = finished % self.ring_passes
                 if counters[_DONE + place] != samples[finished] * self.sample_jobs:
                     break
                 self._accumulate(place, samples[finished], first + finished * self.pass_samples)
@@ -294,19 +300,27 @@ class Wavefront:
     def _start_round(self, first: int, pass_jobs: int, last_pass: int, last_samples: int) -> None:
         self.render["seed"] = self.film.seed
         self.render["first_sample"], self.render["pass_samples"] = first, self.pass_samples
-        self.render["pass_jobs"], self.render["ring_passes"] = pass_jobs, self.pool.ring_passes
+        self.render["pass_jobs"], self.render["ring_passes"] = pass_jobs, self.ring_passes
         self.render["last_pass"], self.render["last_samples"] = last_pass, last_samples
         self._write("render", self.render)
-        counters = np.zeros(_DONE + self.pool.ring_passes, np.uint32)
+        counters = np.zeros(_DONE + self.ring_passes, np.uint32)
         counters[_NON_FINITE] = self.non_finite()  # counts over all rounds
         self._write("counters", counters)
+        self._allowed = 0
         self._read_handled()
         self._write("queue_lengths", self.handled.all_idle(self.plan.tuning.group_slots))
 
-    def _launch(self, waves: int) -> tuple[int, float]:
-        """Run up to `waves` waves; return how many and the seconds they took, which are booked by stage.
+    def _allow(self, jobs: int) -> None:
+        """Let paths begin up to this number of jobs."""
+        if jobs != self._allowed:
+            self._allowed = jobs
+            self._set_counter(_JOB_LIMIT, jobs)
 
-        One wave is queued behind the one that runs, so that a batch that turns out long can be cut.
+    def _launch(self, waves: int) -> tuple[int, float, np.ndarray]:
+        """Run up to `waves` waves: how many, the seconds they took, booked by stage, and the counters.
+
+        One wave is queued behind the one that runs, so that a batch that turns out long can be cut.  The
+        device is waited for as seldom as can be: each time it rests for a third of a millisecond.
         """
         local = self.plan.tuning.local_size
         launched: list[list[cl.Event]] = []
@@ -324,7 +338,7 @@ class Wavefront:
                 launched[-2][-1].wait()
                 if time.perf_counter() - start > 2 * _BATCH_SECONDS:
                     break
-        launched[-1][-1].wait()
+        counters = self._read_counters()
         self.launches += len(launched) * len(self.plan.stages)
         self.waves += len(launched)
         if self.profiler:
@@ -335,10 +349,15 @@ class Wavefront:
                 seconds = 1e-9 * (event.profile.end - event.profile.start)
                 self.seconds[stage] += seconds
                 total += seconds
-        return len(launched), total
+        return len(launched), total, counters
+
+    def _set_counter(self, number: int, value: int) -> None:
+        """Set a counter once what is queued has run, without waiting for it."""
+        pattern = np.array([value], np.uint32)
+        cl.enqueue_fill_buffer(self.device.queue, self.buffers["counters"], pattern, 4 * number, 4)
 
     def _read_counters(self) -> np.ndarray:
-        return self._read("counters", np.empty(_DONE + self.pool.ring_passes, np.uint32))
+        return self._read("counters", np.empty(_DONE + self.ring_passes, np.uint32))
 
     def _accumulate(self, ring_pass: int, samples: int, first: int) -> None:
         """Add one finished pass, from sample `first` on, to the film and free its place in the ring."""
@@ -360,12 +379,12 @@ class Wavefront:
             np.uint32(self.listed),
         )
         event = launch(self.device, kernel, self.listed)
+        self._set_counter(_DONE + ring_pass, 0)
         event.wait()
         self.launches += 1
         self.seconds["accumulate"] += 1e-9 * (event.profile.end - event.profile.start)
         if self.profiler:
             self.profiler.launched("accumulate", event, samples * self.listed)
-        self._write("counters", np.zeros(1, np.uint32), 4 * (_DONE + ring_pass))
 
     def slot_statistics(self) -> dict[str, float]:
         """Statistics that slots keep for themselves, combined over the slots."""

@@ -227,7 +227,7 @@ def test_passes_over_any_list_fit_into_the_ring(device, listed):
     session = opened(device, inside(20))
     wavefront = session.wavefront
     wavefront.list_pixels(np.arange(listed))
-    jobs = wavefront.pass_samples * wavefront.sample_jobs * wavefront.pool.ring_passes
+    jobs = wavefront.pass_samples * wavefront.sample_jobs * wavefront.ring_passes
     assert 4 * jobs * session.plan.channels <= wavefront.buffers["results"].size
 
 
