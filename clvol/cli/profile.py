@@ -10,8 +10,7 @@ from clvol.base.memory import format_bytes
 if TYPE_CHECKING:
     from clvol.picture.profile import KernelProfile, Profile
 
-LANES = "lanes busy"
-COLUMNS = ("", "seconds", "share", "launches", "µs a launch", "items", "ns an item", "bytes an item", LANES)
+COLUMNS = ("", "seconds", "share", "launches", "µs a launch", "items", "ns an item", "bytes an item")
 _SHORTEST = 5e-4
 """Seconds of a step that is worth a word."""
 
@@ -26,9 +25,10 @@ def profile_lines(profile: Profile) -> list[str]:
     ]
     steps = [f"{name} {seconds:.3g}" for name, seconds in profile.steps.items() if seconds > _SHORTEST]
     return [
-        *_table(rows, by_lanes=any(kernel.lanes_busy is not None for kernel in profile.kernels.values())),
+        *_table(rows),
         f"  outside of the stages' kernels: {100 * profile.outside:.1f} % of {profile.seconds:.3g} s; "
         f"{format_bytes(copied.bytes)} copied; {profile.cpu_seconds / profile.seconds:.2f} threads busy",
+        *([] if profile.lanes_busy is None else [f"  lanes busy: {100 * profile.lanes_busy:.0f} %"]),
         f"  seconds before and after: {', '.join(steps)}",
     ]
 
@@ -44,28 +44,26 @@ def _brief(number: float) -> str:
 
 
 def _kernel_row(name: str, kernel: KernelProfile, of: float) -> list[str]:
-    each, busy = kernel.nanoseconds, kernel.lanes_busy
+    each = kernel.nanoseconds
     return [
         *_row(name, kernel.seconds, of, kernel.launches),
         f"{kernel.items:,}",
         "-" if each is None else _brief(each),
         str(kernel.item_bytes),
-        "-" if busy is None else f"{100 * busy:.0f} %",
     ]
 
 
-def _table(rows: list[list[str]], by_lanes: bool) -> list[str]:
+def _table(rows: list[list[str]]) -> list[str]:
     from rich import box
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    columns = COLUMNS if by_lanes else COLUMNS[:-1]
     table = Table(box=box.SIMPLE)
-    for name in columns:
+    for name in COLUMNS:
         table.add_column(name, justify="right" if name else "left")
     for row in rows:
-        table.add_row(*map(Text, row[: len(columns)]))
+        table.add_row(*map(Text, row))
     text = io.StringIO()
     Console(file=text, width=10_000, color_system=None).print(table)
     return [line.rstrip() for line in text.getvalue().splitlines() if line.strip()]

@@ -38,14 +38,12 @@ class KernelProfile:
     items : paths that it handled; samples that accumulate added to the film.
     item_bytes : of a path's state and queues that it reads and writes for each, at most.  Volumes, majorants
         and tables come on top.
-    lanes_busy : share of the lanes that had a path, of kernels that walk many at once; None for others.
     """
 
     seconds: float = 0.0
     launches: int = 0
     items: int = 0
     item_bytes: int = 0
-    lanes_busy: float | None = None
 
     @property
     def nanoseconds(self) -> float | None:
@@ -83,6 +81,7 @@ class Profile:
     seconds, cpu_seconds : of the render: what passed, and what all threads of the process worked.
     host, device : what happened there.  The device's are launches and copies.
     in_flight : nanoseconds, and paths in flight then, at the beginning of every wave.
+    lanes_busy : share of the lanes' steps that had a path, where walks go many at once; else None.
     left_out : launches and copies that are in the sums but not in `device`, as they were too many.
     about : of the render, as its metadata.
     """
@@ -94,6 +93,7 @@ class Profile:
     host: list[Span] = field(repr=False)
     device: list[Span] = field(repr=False)
     in_flight: list[tuple[int, int]] = field(repr=False)
+    lanes_busy: float | None = None
     left_out: int = 0
     about: dict[str, Any] = field(default_factory=dict, repr=False)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from contextlib import contextmanager, nullcontext
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyopencl as cl
@@ -17,7 +17,7 @@ from clvol import layout
 from clvol.picture.profile import ACCUMULATE, RENDER, CopyProfile, KernelProfile, Profile, Span
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from contextlib import AbstractContextManager
 
     from clvol.device.device import Device
@@ -125,6 +125,7 @@ class Profiler:
             self.host,
             self.device_spans,
             self.in_flight,
+            busy_lanes(result.stats),
             self.left_out,
             {name: value for name, value in result.metadata.items() if isinstance(value, str | int | float)},
         )
@@ -140,6 +141,12 @@ class Profiler:
 
     def _time(self, nanoseconds: int) -> int:
         return nanoseconds + self._offset
+
+
+def busy_lanes(stats: Mapping[str, Any]) -> float | None:
+    """Share of the lanes' steps that had a path; None where no walk goes by lanes."""
+    steps = stats.get("lane_steps", 0)
+    return stats["busy_lane_steps"] / steps if steps else None
 
 
 def _clock_offset(device: Device) -> int:

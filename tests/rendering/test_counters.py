@@ -11,8 +11,11 @@ import pytest
 from benched import benched
 
 import clvol
+from clvol.planning import auto
 
 SPP = 32
+SAMPLER = auto.DEFAULT_SAMPLER
+"""That of users, which a fixture replaces for other tests."""
 PER_SAMPLE = ("lookups", "cells", "collisions", "shadow_rays", "handled")
 CLOSE = 0.05
 """Relative: other random numbers, or another device's rounding, move counts per sample by less."""
@@ -62,7 +65,7 @@ def counted(result):
 
 @pytest.mark.parametrize("name", PINNED)
 def test_a_render_does_no_more_and_no_less_than_it_did(name, tmp_path):
-    now = counted(clvol.render(benched(name, tmp_path), spp=SPP, seed=1, sampler="sobol"))
+    now = counted(clvol.render(benched(name, tmp_path), spp=SPP, seed=1, sampler=SAMPLER))
     values = ", ".join(f"{getattr(now, f.name):.4g}" for f in fields(now))
     for field in fields(now):
         pinned, value = getattr(PINNED[name], field.name), getattr(now, field.name)
