@@ -46,6 +46,9 @@ def render(
     probability: str = "auto",
     control: str = "auto",
     sampler: str = "auto",
+    shadow_cache: str = "auto",
+    light_choice: str = "auto",
+    next_event: str = "auto",
     majorant_scale: float = 1.0,
     step: float | None = None,
     aov: Sequence[str] = (),
@@ -65,11 +68,13 @@ def render(
         From `load_file` or `load_dict`.
     spp, seed
         Samples per pixel and 64-bit seed. They default to the scene's.
-    technique, transmittance, majorant, lookup, absorption, probability, control, sampler
+    technique, transmittance, majorant, lookup, absorption, probability, control
         Names from `clvol.planning.registry`. "auto" takes the scene's own choice, else follows fixed rules,
         so that the same seed gives the same bits. Technique "auto:pilot" has a short measured pilot choose
         technique, transmittance and majorant, where they are left at "auto". ``result.metadata["repeat"]``
         says what it chose.
+    sampler, shadow_cache, light_choice, next_event
+        Names from there too.
     majorant_scale
         Multiplies every bound of the density, for experiments. A factor below 1 is only for techniques and
         transmittances that stay unbiased there.
@@ -171,7 +176,7 @@ def plan(scene: Scene, **choices: Any) -> Plan:
     ----------
     scene : from `load_file` or `load_dict`.
     choices : technique, transmittance, majorant, lookup, absorption, probability, control, sampler,
-        majorant_scale, step, target_error, aov, as for `render`.
+        shadow_cache, light_choice, next_event, majorant_scale, step, target_error, aov, as for `render`.
 
     Returns
     -------

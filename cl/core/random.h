@@ -10,7 +10,7 @@
 /* Blocks of four dimensions within one bounce. */
 #define BLOCK_CAMERA 0u    /* pixel x, pixel y, place on the lens (2) */
 #define BLOCK_WALK 1u      /* first distance, event, stream seed (2); one block per segment walked */
-#define BLOCK_LIGHT 2u     /* light choice, light point (2), - */
+#define BLOCK_LIGHT 2u     /* light choice, light point (2), whether its shadow ray is traced */
 #define BLOCK_DIRECTION 3u /* scattered direction (2), roulette, lobe of the phase function */
 #define BLOCK_SHADOW 4u    /* first distance, -, stream seed (2); one block per segment walked */
 #define BLOCK_SURFACE 5u   /* opacity, direction (2), lobe of the BSDF; one block per surface met */

@@ -10,6 +10,7 @@
 #include "core/sampling.h"
 #include "core/scene.h"
 #include "emitter/cdf.h"
+#include "emitter/choice.h"
 #include "emitter/light_sample.h"
 #include "geometry/surface.h"
 
@@ -109,7 +110,7 @@ INLINE void sample_area(const Scene *scene, __global const Emitter *emitter, flo
     if (CLVOL_HAS_AREA_SPHERE && shape->kind == SURFACE_SPHERE && sphere_cone(shape, from, &cone)) {
         light->direction = cone_direction(&cone, u, v, &light->distance);
         light->primitive = emitter->primitive;
-        light->pdf = emitter->select_pdf * cone_pdf(&cone);
+        light->pdf = light->chosen * cone_pdf(&cone);
         light->value = emitter_value(emitter) / light->pdf;
         return;
     }
@@ -122,8 +123,8 @@ INLINE void sample_area(const Scene *scene, __global const Emitter *emitter, flo
     light->value = (float3)(0.0f);
     light->pdf = 0.0f;
     if (facing > 0.0f) {
-        light->pdf = emitter->select_pdf * square / facing;
-        light->value = emitter_value(emitter) * (facing / (emitter->select_pdf * square));
+        light->pdf = light->chosen * square / facing;
+        light->value = emitter_value(emitter) * (facing / (light->chosen * square));
     }
 }
 
@@ -149,10 +150,11 @@ INLINE float area_pdf(const Scene *scene, const Surface *surface, float3 from, f
     if (!emitter)
         return 0.0f;
     __global const Shape *shape = scene->shapes + surface->shape;
+    const float chosen = light_probability(scene, (uint)shape->emitter, from);
     SphereCone cone;
     if (CLVOL_HAS_AREA_SPHERE && shape->kind == SURFACE_SPHERE && sphere_cone(shape, from, &cone))
-        return emitter->select_pdf * cone_pdf(&cone);
-    return emitter->select_pdf * distance * distance / (emitter->area * -dot_of(surface->ng, d));
+        return chosen * cone_pdf(&cone);
+    return chosen * distance * distance / (emitter->area * -dot_of(surface->ng, d));
 }
 
 #endif

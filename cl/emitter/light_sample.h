@@ -4,6 +4,8 @@
 #include "core/scene.h"
 
 typedef struct {
+    uint number;      /* of the light */
+    float chosen;     /* probability of that light */
     float3 direction; /* towards the light */
     float distance;   /* to the light's point */
     float3 value;     /* light arriving, over the probability of this choice */

@@ -23,8 +23,8 @@ INLINE void sample_spot(__global const Emitter *emitter, float3 from, LightSampl
     const float3 to = (float3)(emitter->position[0], emitter->position[1], emitter->position[2]) - from;
     light->distance = sqrt_of(dot_of(to, to));
     light->direction = to / light->distance;
-    light->value = emitter_value(emitter) * (spot_falloff(emitter, -light->direction) /
-                                             (emitter->select_pdf * light->distance * light->distance));
+    light->value = emitter_value(emitter) *
+                   (spot_falloff(emitter, -light->direction) / (light->chosen * light->distance * light->distance));
 }
 
 #endif

@@ -1,6 +1,7 @@
 /* What scatterings at surfaces and in media have in common: the depth they may reach, roulette, and shadow rays. */
 #ifndef CLVOL_STAGES_BOUNCE_H
 #define CLVOL_STAGES_BOUNCE_H
+#include "emitter/light_cache.h"
 #if CLVOL_NEE
 #include "emitter/light_sample.h"
 #endif
@@ -35,6 +36,28 @@ INLINE bool survives_roulette(uint k, float weight, Spectrum *beta)
     *beta /= weight;
     return true;
 }
+
+#if CLVOL_LIGHT_CACHE
+/* Share of what is typical below which a shadow ray may be left out; and the least transmittance that it is expected to
+   have, so that what it brings is bounded where the cache is wrong. */
+#define WORTH_TRACING 0.25f
+#define LEAST_EXPECTED 0.01f
+
+/* Roulette of a shadow ray by what it will bring, as the cache of lights has it: the more it falls short of what is
+   typical, the rarer it is traced.  `transmittance`: the cached one.  Its lower bound keeps what a ray brings bounded where
+   the cache is wrong. */
+INLINE bool traces_shadow_ray(const Scene *scene, uint k, float transmittance, Spectrum *value)
+{
+    const float expected = spectrum_max(*value) * max_of(transmittance, LEAST_EXPECTED);
+    const float enough = WORTH_TRACING * scene->light_cache->typical;
+    if (!(expected < enough))
+        return true;
+    if (!(uniform_float(k) * enough < expected))
+        return false;
+    *value *= enough / expected;
+    return true;
+}
+#endif
 
 #if CLVOL_NEE
 /* Makes a shadow ray that brings `value` along if nothing is in its way. */

@@ -14,6 +14,7 @@
 #include "phase/phase.h"
 #if CLVOL_HAS_SCATTERING
 #include "stages/bounce.h"
+#include "stages/direction_control.h"
 #endif
 #include "path/key.h"
 #include "path/ray.h"
@@ -64,7 +65,7 @@ INLINE bool survives_absorption(const Scene *scene, uint slot, SampleKey key, ui
 
 /* Next-event estimation: whether it made a shadow ray, towards one light. */
 INLINE bool next_event(const Scene *scene, uint slot, SampleKey key, __global const Medium *medium, float3 p, float3 wo,
-                       Spectrum beta)
+                       float3 wi, Spectrum beta)
 {
 #if CLVOL_NEE
     if (!medium->sample_emitters)
@@ -74,9 +75,21 @@ INLINE bool next_event(const Scene *scene, uint slot, SampleKey key, __global co
                                            uniform_below_one(k.z));
     const float pdf = phase_pdf(scene, medium, wo, light.direction);
     const float weight = light.pdf > 0.0f ? mis_weight(light.pdf, pdf) : 1.0f;
-    const Spectrum value = beta * to_spectrum(light.value, (int)path_channel(scene, slot)) * (pdf * weight);
+    const Spectrum unoccluded = beta * to_spectrum(light.value, (int)path_channel(scene, slot));
+    Spectrum value = unoccluded * (pdf * weight);
     if (!(spectrum_max(value) > 0.0f))
         return false;
+#if CLVOL_LIGHT_CACHE
+    const float transmittance = cached_transmittance(scene, light.number, p, light.direction, light.distance);
+#if CLVOL_DIRECTION_CONTROL
+    if (!(light.pdf > 0.0f) && !(CLVOL_HAS_MAX_DEPTH && key.bounce + 1 >= scene->render->max_depth)) {
+        const Spectrum added = unoccluded * direction_control(scene, medium, transmittance, wo, wi, light.direction);
+        set_path_radiance(scene, slot, path_radiance(scene, slot) + added);
+    }
+#endif
+    if (!traces_shadow_ray(scene, k.w, transmittance, &value))
+        return false;
+#endif
     set_path_shadow_inside(scene, slot, path_inside(scene, slot));
     make_shadow_ray(scene, slot, p, &light, value);
     return true;
@@ -94,14 +107,14 @@ INLINE bool scatter(const Scene *scene, uint slot, SampleKey key, __global const
         return false;
     set_path_bounce(scene, slot, key.bounce); /* also numbers the shadow ray's random numbers */
     const Ray ray = path_ray(scene, slot);
-    *shadow_ray = next_event(scene, slot, key, medium, ray.o, ray.d, beta);
     const uint4 k = decision_block(scene, key, BLOCK_DIRECTION, 0);
-    const float weight = spectrum_max(beta) * path_eta_squared(scene, slot);
-    if (meets_roulette(scene, key.bounce, weight) && !survives_roulette(k.z, weight, &beta))
-        return false;
     float pdf;
     const float3 wi = phase_sample(scene, medium, ray.d, uniform_below_one(k.x), uniform_below_one(k.y),
                                    uniform_float(k.w), &pdf);
+    *shadow_ray = next_event(scene, slot, key, medium, ray.o, ray.d, wi, beta);
+    const float weight = spectrum_max(beta) * path_eta_squared(scene, slot);
+    if (meets_roulette(scene, key.bounce, weight) && !survives_roulette(k.z, weight, &beta))
+        return false;
     set_path_pdf(scene, slot, medium->sample_emitters ? pdf : 0.0f);
     set_path_direction(scene, slot, wi);
     set_path_beta(scene, slot, beta);

@@ -15,7 +15,8 @@ INLINE void shade_escape(const Scene *scene, uint slot)
         return;
 #endif
     float light_pdf;
-    const float3 rgb = environment(scene, path_ray(scene, slot).d, &light_pdf);
+    const Ray ray = path_ray(scene, slot);
+    const float3 rgb = environment(scene, ray.o, ray.d, &light_pdf);
     Spectrum radiance = path_beta(scene, slot) * to_spectrum(rgb, (int)path_channel(scene, slot));
     const float pdf = path_pdf(scene, slot);
     if (pdf > 0.0f)

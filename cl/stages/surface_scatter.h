@@ -79,9 +79,14 @@ INLINE bool surface_next_event(const Scene *scene, uint slot, SampleKey key, con
     const Spectrum f = bsdf_value(scene, side->material, surface->uv, on_side(side, wi),
                                   on_side(side, to_local(surface, light.direction)), channel, &pdf);
     const float weight = light.pdf > 0.0f ? mis_weight(light.pdf, pdf) : 1.0f;
-    const Spectrum value = beta * f * to_spectrum(light.value, channel) * weight;
+    Spectrum value = beta * f * to_spectrum(light.value, channel) * weight;
     if (spectrum_max(value) == 0.0f)
         return false;
+#if CLVOL_LIGHT_CACHE
+    const float through = cached_transmittance(scene, light.number, surface->p, light.direction, light.distance);
+    if (!traces_shadow_ray(scene, k.w, through, &value))
+        return false;
+#endif
     Inside inside = path_inside(scene, slot);
     cross_boundary(scene->shapes + surface->shape, surface->ng, light.direction, &inside);
     set_path_shadow_inside(scene, slot, inside);

@@ -43,10 +43,10 @@ class _Command(ExplainedCommand):
 def _names_options(command: F) -> F:
     """--techniques or --technique, and the same for every family of the registry."""
     from clvol.lab.names import plural
-    from clvol.planning.registry import FAMILIES, FAMILY_PURPOSE
+    from clvol.planning.registry import FAMILIES, FAMILY_PURPOSE, option
 
     for family in reversed(FAMILIES):
-        spellings = (f"--{plural(family)}", f"--{family}")
+        spellings = (option(plural(family)), option(family))
         kind = RegistryNames(family)
         text = FAMILY_PURPOSE[family]
         command = click.option(*spellings, family, type=kind, default="auto", help=text)(command)

@@ -140,12 +140,12 @@ def family_options(*left_out: str, pilot: bool = False) -> Callable[[F], F]:
 
     `pilot`: a technique may be "auto:pilot" too.
     """
-    from clvol.planning.registry import FAMILIES, FAMILY_PURPOSE
+    from clvol.planning.registry import FAMILIES, FAMILY_PURPOSE, option
 
     def add(command: F) -> F:
         for family in reversed([family for family in FAMILIES if family not in left_out]):
             kind, text = RegistryChoice(family, pilot), FAMILY_PURPOSE[family]
-            command = click.option(f"--{family}", type=kind, default="auto", help=text)(command)
+            command = click.option(option(family), type=kind, default="auto", help=text)(command)
         return command
 
     return add

@@ -96,6 +96,11 @@ def stage_source(plan: Plan, stage: str) -> str:
     return compose(plan, text, stage=layout.stage(stage))
 
 
+def light_cache_source(plan: Plan) -> str:
+    """The composed source of the kernels that fill the cache of lights."""
+    return compose(plan, '#include "kernels/light_cache.cl"\n')
+
+
 def build(device: Device, source: str, name: str) -> cl.Program:
     """Build a unit, once per device and process.
 

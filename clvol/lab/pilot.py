@@ -31,7 +31,7 @@ from clvol.lab.reduced import reduced
 from clvol.lab.seeds import independent_seeds
 from clvol.lab.trials import Trial
 from clvol.planning.plan import Plan
-from clvol.planning.registry import FAMILIES
+from clvol.planning.registry import FAMILIES, option
 from clvol.rendering.session import MAX_SAMPLES, Session
 from clvol.tables.prepare import PreparedScene, prepare
 
@@ -292,5 +292,5 @@ class Pilot:
         if numbers:
             reason += f"; {self.seconds:.1f} s of rendering, {self.kernel_seconds:.1f} s of kernel builds"
         used = {f: n for f, n in chosen.items() if names[f] == n or (f == "transmittance" and plan.nee)}
-        options = " ".join(f"--{family} {name}" for family, name in used.items())
+        options = " ".join(f"{option(family)} {name}" for family, name in used.items())
         return Found(chosen, options, reason, relative, self.seconds, self.kernel_seconds)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
-from clvol.planning.registry import FAMILIES
+from clvol.planning.registry import FAMILIES, option
 from clvol.rendering.outcome import make_result
 from clvol.rendering.session import Session
 
@@ -61,7 +61,7 @@ class Trial:
             for family, name in self.names.items()
             if name in FAMILIES[family] and name == chosen[family]
         }
-        return " ".join(f"--{family} {name}" for family, name in used.items())
+        return " ".join(f"{option(family)} {name}" for family, name in used.items())
 
     def render(self, seed: int, spp: int) -> Result:
         """Samples 0 to spp of every pixel; ``stats["seconds"]["render"]`` is what they took."""

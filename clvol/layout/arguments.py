@@ -41,6 +41,8 @@ ARGUMENTS = (
     Argument("blackbody", "__global const float *", "CLVOL_HAS_TEMPERATURE"),
     Argument("phases", "__global const Phase *", "CLVOL_HAS_SCATTERING"),
     Argument("emitters", "__global const Emitter *", "CLVOL_HAS_EMITTERS"),
+    Argument("light_cache", "__global const LightCache *", "CLVOL_LIGHT_CACHE"),
+    Argument("light_transmittance", "__global const float *", "CLVOL_LIGHT_CACHE"),
     Argument("bvh_nodes", "__global const float8 *", "CLVOL_HAS_SURFACES"),
     Argument("bvh_triangles", "__global const float8 *", "CLVOL_HAS_SURFACES"),
     Argument("quadrics", "__global const Quadric *", "CLVOL_HAS_QUADRICS"),

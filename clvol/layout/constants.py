@@ -32,6 +32,9 @@ BVH_STACK = (BVH_WIDTH - 1) * BVH_MOST_DEPTH + 1
 RANDOMIZATIONS = 4
 """Independent randomisations that a pixel's low-discrepancy samples are dealt to in turn; a power of two."""
 
+MOST_WEIGHED_LIGHTS = 16
+"""Lights, the strongest, that the choice among lights tells apart by what they bring to a point."""
+
 COAT_ENTRIES = 64
 """Entries of the table of what a rough plastic's coat lets through, over the cosine of incidence."""
 

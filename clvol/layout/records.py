@@ -73,8 +73,8 @@ EMITTER = _record(
     ("select_pdf", "f", 1),  # probability that next-event estimation picks it
     ("cdf", "f", 1),  # of picking it or one from number 1 on that comes before; of number 0: 1
     ("value", "f", 3),  # radiance, irradiance or intensity
-    ("vector", "f", 3),  # direction of travel, position, or a spot's axis
-    ("position", "f", 3),  # of a spot
+    ("vector", "f", 3),  # direction of travel, a spot's axis, or the mean normal of an area light
+    ("position", "f", 3),  # of a point or spot, or the middle of an area light
     ("cutoff_angle", "f", 1),  # of a spot, radians
     ("beam_width", "f", 1),  # of a spot, radians
     ("shape", "i", 1),  # of an area light
@@ -82,6 +82,13 @@ EMITTER = _record(
     ("first", "i", 1),  # of a mesh's entries in `light_faces` and `light_cdf`
     ("primitive", "u", 1),  # first primitive of an area light
     ("count", "u", 1),  # of its primitives, which follow each other
+)
+
+LIGHT_CACHE = _record(
+    ("lower", "f", 3),  # corner of the grid
+    ("cells_per_length", "f", 1),
+    ("size", "i", 3),  # cells per axis
+    ("typical", "f", 1),  # radiance that half of the singly scattered light does not exceed
 )
 
 SHAPE = _record(
@@ -179,6 +186,7 @@ RECORDS = {
     "Medium": MEDIUM,
     "Phase": PHASE,
     "Emitter": EMITTER,
+    "LightCache": LIGHT_CACHE,
     "Shape": SHAPE,
     "Quadric": QUADRIC,
     "Material": MATERIAL,

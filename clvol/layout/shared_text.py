@@ -29,6 +29,7 @@ _NUMBERS = (
     "BVH_LEAF",
     "BVH_HAS_QUADRICS",
     "COAT_ENTRIES",
+    "MOST_WEIGHED_LIGHTS",
 )
 """Names in `clvol.layout.constants`, which kernels know by the same."""
 

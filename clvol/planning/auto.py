@@ -42,6 +42,9 @@ def resolve(
         "absorption": ("mixed", "no path is absorbed that weighs much, none followed that weighs little"),
         "probability": ("history", "weights stay bounded"),
         "control": ("mean", "leaves the least residual to estimate"),
+        "shadow_cache": ("on", "shadow rays that would bring next to nothing are rarely traced"),
+        "light_choice": ("contribution", "each light as often as it matters at the point"),
+        "next_event": ("control", "the noise of a phase function's peak is less"),
         "sampler": (DEFAULT_SAMPLER, _SAMPLERS[DEFAULT_SAMPLER]),
     }
     names, reasons = {}, {}

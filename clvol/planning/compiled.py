@@ -91,6 +91,9 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_PIXEL_LIST": int(plan.pixel_list),
         "CLVOL_NEE": int(plan.nee),
         "CLVOL_MIS": int(plan.mis),
+        "CLVOL_LIGHT_CACHE": int(plan.light_cache),
+        "CLVOL_LIGHT_CHOICE": int(plan.light_choice),
+        "CLVOL_DIRECTION_CONTROL": int(plan.direction_control),
         "CLVOL_ABSORPTION": layout.enum("ABSORPTION", plan.chosen["absorption"]),
         "CLVOL_PROBABILITY": layout.enum("PROBABILITY", plan.chosen["probability"]),
     }

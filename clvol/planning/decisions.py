@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from clvol.planning.names import Names
     from clvol.scene.boundaries import Boundaries
 
+UNIFORM_SHARE = 0.25
+"""Of the table of lights, where it is mixed with what each brings to a point (cl/emitter/choice.h)."""
+
 
 @dataclass(frozen=True)
 class Decisions:
@@ -106,6 +109,26 @@ class Decisions:
         f = self.features
         sampled = f.samples_lights and (f.scattering or f.samples_at_surfaces)
         return self.chosen["transmittance"] != "none" and sampled
+
+    @property
+    def light_cache(self) -> bool:
+        """A cache of transmittances to the lights is filled and used."""
+        return self.chosen["shadow_cache"] == "on" and self.nee and self.features.heterogeneous
+
+    @property
+    def light_choice(self) -> bool:
+        """There are lights to choose among, which is done by what they bring."""
+        return self.chosen["light_choice"] == "contribution" and self.nee and self.features.emitters > 1
+
+    @property
+    def uniform_share(self) -> float:
+        """Share of the table by which lights are chosen that goes to all of them alike."""
+        return UNIFORM_SHARE if self.light_choice else 0.0
+
+    @property
+    def direction_control(self) -> bool:
+        """Next-event estimation in media has a control variate, which goes by that cache."""
+        return self.chosen["next_event"] == "control" and self.light_cache and self.features.peaked
 
     @property
     def mis(self) -> bool:

@@ -90,6 +90,11 @@ class Features:
         return found
 
     @property
+    def peaked(self) -> bool:
+        """Some phase function has a peak, and some light is found by next-event estimation alone."""
+        return "HG" in self.phases and (self.directional or self.point_lights or self.spot)
+
+    @property
     def near_lights(self) -> bool:
         """Lights at a finite distance."""
         return self.point_lights or self.spot or self.area

@@ -30,6 +30,11 @@ def used_names(plan: Decisions) -> Names:
         "probability": chosen["probability"] if plan.spectrum == 3 and (on_walks or absorbed) else "none",
         "control": chosen["control"] if plan.needs_residuals else "none",
         "sampler": chosen["sampler"],
+        "shadow_cache": chosen["shadow_cache"] if plan.nee and walks else "none",
+        "light_choice": chosen["light_choice"] if plan.nee and features.emitters > 1 else "none",
+        "next_event": ("control" if plan.direction_control else "plain")
+        if plan.nee and features.scattering
+        else "none",
     }
     return Names(used)
 
@@ -63,6 +68,9 @@ def reasons(plan: Decisions) -> dict[str, str]:
         "probability": "no path chooses between events by weights of several channels",
         "control": "only residual-ratio subtracts one",
         "sampler": "",
+        "shadow_cache": "no shadow ray passes a heterogeneous medium",
+        "light_choice": "there is one light at most to sample",
+        "next_event": "no light is sampled in media",
     }
     found = {}
     for family, name in used.items():

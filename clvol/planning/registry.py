@@ -154,6 +154,18 @@ SAMPLERS = {
         low_discrepancy=True,
     ),
 }
+SHADOW_CACHES = {
+    "on": Choice("a coarse transmittance to every light says which shadow rays are worth tracing"),
+    "off": Choice("every shadow ray is traced"),
+}
+LIGHT_CHOICES = {
+    "contribution": Choice("by what each light is expected to bring to the point, power and a uniform share"),
+    "power": Choice("by the power of each light"),
+}
+NEXT_EVENTS = {
+    "plain": Choice("light times phase function times transmittance"),
+    "control": Choice("with a control variate of zero mean, that knows where the path goes on"),
+}
 
 FAMILIES = {
     "technique": TECHNIQUES,
@@ -164,6 +176,9 @@ FAMILIES = {
     "probability": PROBABILITIES,
     "control": CONTROLS,
     "sampler": SAMPLERS,
+    "shadow_cache": SHADOW_CACHES,
+    "light_choice": LIGHT_CHOICES,
+    "next_event": NEXT_EVENTS,
 }
 FAMILY_PURPOSE = {
     "technique": "How collisions are sampled.",
@@ -174,6 +189,9 @@ FAMILY_PURPOSE = {
     "probability": "How a spectral technique chooses events.",
     "control": "What residual-ratio subtracts.",
     "sampler": "How the samples of a pixel are drawn.",
+    "shadow_cache": "Whether shadow rays and lights are chosen by a cache of transmittances.",
+    "light_choice": "How next-event estimation picks a light.",
+    "next_event": "How next-event estimation in media weighs its light.",
 }
 
 FIRST_HIT = {
@@ -194,6 +212,11 @@ AOVS = (
     | FIRST_HIT
 )
 """Pictures that may be asked for beside the image; what walks count, per path, comes first."""
+
+
+def option(family: str) -> str:
+    """How the command line spells a family."""
+    return f"--{family.replace('_', '-')}"
 
 
 PILOT = "auto:pilot"

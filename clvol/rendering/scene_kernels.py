@@ -56,8 +56,9 @@ class SceneKernels:
 
     def upload(self, seed: int) -> None:
         """Write the prepared scene to the device (again)."""
-        record = self.device.memory.upload(render_record(self.prepared, seed), "the camera")
-        self.buffers = upload_scene(self.device, self.prepared) | {"render": record}
+        record = render_record(self.prepared, seed)
+        uploaded = self.device.memory.upload(record, "the camera")
+        self.buffers = upload_scene(self.device, self.prepared, record) | {"render": uploaded}
 
     def run_unit(
         self,

@@ -110,7 +110,7 @@ class Session:
         with SideBuilds(device, units.values()) as builds:
             uploading = time.perf_counter()
             with timed(profiler, "upload"):
-                buffers = upload_scene(device, prepared)
+                buffers = upload_scene(device, prepared, record)
             uploaded = time.perf_counter()
             with timed(profiler, "kernels"):
                 kernels = build_stages(device, units, builds)

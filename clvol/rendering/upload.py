@@ -13,6 +13,7 @@ import pyopencl as cl
 
 from clvol import layout
 from clvol.layout import BRICK_SAMPLES
+from clvol.rendering.light_cache import light_cache_buffers
 from clvol.scene import records
 from clvol.tables.affine import rows_3x4
 from clvol.tables.blackbody import blackbody_table
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
     from clvol.tables.surfaces import Surfaces
 
 
-def upload_scene(device: Device, prepared: PreparedScene) -> dict[str, cl.Buffer]:
-    """Buffers of every scene argument that the plan needs, by argument name."""
+def upload_scene(device: Device, prepared: PreparedScene, render: np.ndarray) -> dict[str, cl.Buffer]:
+    """Buffers of every scene argument that the plan needs, by argument name, but the RENDER record."""
     buffers: dict[str, cl.Buffer] = {}
     needed = {argument.name for argument in layout.arguments(prepared.plan.macros)}
     if "sobol" in needed:
@@ -67,7 +68,9 @@ def upload_scene(device: Device, prepared: PreparedScene) -> dict[str, cl.Buffer
         buffers["blackbody"] = _buffer(device, blackbody_table())
     if "phases" in needed:
         buffers["phases"] = _buffer(device, phase_table(entries))
-    lights = light_table(prepared.scene, prepared.centre, prepared.radius, prepared.surfaces)
+    lights = light_table(
+        prepared.scene, prepared.centre, prepared.radius, prepared.surfaces, prepared.plan.uniform_share
+    )
     arrays = {"emitters": lights.emitters, "light_faces": lights.faces, "light_cdf": lights.cdf}
     if prepared.surfaces is not None:
         arrays |= _surface_arrays(prepared.surfaces, lights)
@@ -78,6 +81,9 @@ def upload_scene(device: Device, prepared: PreparedScene) -> dict[str, cl.Buffer
             buffers[name] = _buffer(device, array)
     if "filter_cdf" in needed:
         buffers["filter_cdf"] = _buffer(device, filter_cdf(prepared.scene.film.rfilter))
+    if "light_cache" in needed:
+        known = {**buffers, "render": device.memory.upload(render, "the camera")}
+        buffers |= light_cache_buffers(device, prepared, known)
     return buffers
 
 

@@ -19,6 +19,9 @@ CHOICES = (
     "probability",
     "control",
     "sampler",
+    "shadow_cache",
+    "light_choice",
+    "next_event",
 )
 """Parameters handed on as strings; what they may say is for the registry of techniques to judge."""
 

@@ -45,12 +45,17 @@ def emitter_order(scene: records.Scene) -> list[records.Emitter]:
 
 
 def light_table(
-    scene: records.Scene, centre: np.ndarray, radius: float, surfaces: Surfaces | None = None
+    scene: records.Scene,
+    centre: np.ndarray,
+    radius: float,
+    surfaces: Surfaces | None = None,
+    uniform: float = 0.0,
 ) -> LightTable:
     """Every light of a scene, by the power it sends through the scene's sphere.
 
     centre : float64 (3,), what device positions are relative to.
     radius : of a sphere round it that holds the scene.
+    uniform : share of the choices that go to all lights alike.
     surfaces : None where a scene has none.
 
     The environment comes first, or else the strongest light; the others follow, weakest first, in the order
@@ -73,20 +78,20 @@ def light_table(
                 members, shares = mesh_run(surfaces, number, table[i])
                 faces.append(members)
                 cdf.append(shares)
-            power[i] = _describe_area(table[i], shapes[number], emission, number)
+            power[i] = _describe_area(table[i], shapes[number], emission, number, centre)
     order = np.argsort(power, kind="stable")
     if len(order):
         first = 0 if emitters and _is_environment(emitters[0]) else order[-1]
         order = np.concatenate([[first], order[order != first]])
     table = table[order]
-    table["select_pdf"], table["cdf"] = selection(power[order])
+    table["select_pdf"], table["cdf"] = selection(power[order], uniform)
     of_shape = np.full(len(shapes), -1, np.int32)
     lit = np.flatnonzero(table["kind"] == layout.enum("EMITTER", "area"))
     of_shape[table["shape"][lit]] = lit
     return LightTable(table, np.concatenate(faces), np.concatenate(cdf), of_shape)
 
 
-def selection(power: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def selection(power: np.ndarray, uniform: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Probability of each light and its cumulative table, float32 (n,) each.
 
     Intervals begin with light 1 and end with light 0, and their borders are multiples of 2⁻³², so that the
@@ -97,6 +102,7 @@ def selection(power: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if not len(power):
         return np.zeros(0, np.float32), np.zeros(0, np.float32)
     share = power / power.sum() if power.sum() > 0 else np.full(len(power), 1 / len(power))
+    share = (1 - uniform) * share + uniform * (share > 0) / np.count_nonzero(share)
     steps = np.ceil(np.roll(share, -1) * RANDOM_STEPS)
     cdf = np.minimum(np.cumsum(steps) / RANDOM_STEPS, 1.0).astype(np.float32)
     cdf[np.flatnonzero(steps)[-1] :] = 1.0
@@ -109,6 +115,10 @@ def mesh_run(surfaces: Surfaces, number: int, record: np.void) -> tuple[np.ndarr
     a, b, c = (surfaces.vertices[surfaces.faces[members, k]].astype(np.float64) for k in range(3))
     area = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)])
     record["count"], record["area"] = len(members), area[-1]
+    if area[-1] > 0:
+        record["position"] = np.diff(area) / area[-1] @ ((a + b + c) / 3)
+        normal = np.cross(b - a, c - a).sum(axis=0) / (2 * area[-1])
+        record["vector"] = -normal if surfaces.shapes[number].flip_normals else normal
     record["primitive"] = members[0] if len(members) else 0
     cdf = area / area[-1] if area[-1] > 0 else np.append(0.0, np.ones(len(members)))
     return np.append(members, 0).astype(np.uint32), cdf.astype(np.float32)
@@ -159,10 +169,18 @@ def _is_environment(emitter: records.Emitter) -> bool:
     return isinstance(emitter, (records.ConstantEmitter, records.EnvmapEmitter))
 
 
-def _describe_area(record: np.void, shape: records.Shape, emission: records.Spectrum, number: int) -> float:
-    """Fill in an area light and return its power; a mesh's area is there already."""
+def _describe_area(
+    record: np.void, shape: records.Shape, emission: records.Spectrum, number: int, centre: np.ndarray
+) -> float:
+    """Fill in an area light and return its power; a mesh's area and place are there already."""
     if shape.kind in QUADRICS:
         record["area"] = quadric_area(shape)
+        middle = [0.0, 0.0, 0.5 if shape.kind == "cylinder" else 0.0, 1.0]
+        record["position"] = (shape.to_world @ middle)[:3] - centre
+        if shape.kind == "disk":
+            normal = np.cross(shape.to_world[:3, 0], shape.to_world[:3, 1])
+            record["vector"] = normal / max(float(np.linalg.norm(normal)), 1e-300)
+            record["vector"] *= -1 if shape.flip_normals else 1
     record["kind"] = layout.enum("EMITTER", "area")
     record["shape"] = number
     record["value"] = rgb(emission)
@@ -182,7 +200,7 @@ def _describe_emitter(record: np.void, emitter: records.Emitter, centre: np.ndar
             record["vector"] = emitter.direction
         case records.PointEmitter():
             value, extent = emitter.intensity, 4 * np.pi
-            record["vector"] = np.asarray(emitter.position) - centre
+            record["position"] = np.asarray(emitter.position) - centre
         case records.SpotEmitter():
             cutoff, beam = np.radians(emitter.cutoff_angle), np.radians(emitter.beam_width)
             value, extent = emitter.intensity, spot_solid_angle(cutoff, beam)

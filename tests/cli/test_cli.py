@@ -20,7 +20,7 @@ from clvol.base.progress import Progress, RichProgress
 from clvol.cli.main import main
 from clvol.picture.estimate import Moments
 from clvol.picture.result import Result as Picture
-from clvol.planning.registry import FAMILIES, automatic
+from clvol.planning.registry import FAMILIES, automatic, option
 
 SCENE = """<scene version="3.0.0">
   <default name="res" value="8"/>
@@ -79,7 +79,7 @@ def test_help_lists_the_commands_with_examples(arguments: list[str]) -> None:
 def test_render_help_reads_its_choices_from_the_registry() -> None:
     text = "".join(run("render", "--help").stdout.split())
     for family, entries in FAMILIES.items():
-        assert f"--{family}[{'|'.join([*automatic(family), *entries])}]" in text
+        assert f"{option(family)}[{'|'.join([*automatic(family), *entries])}]" in text
         for choice in entries.values():
             assert "".join(choice.summary.split()) in text
 
@@ -276,6 +276,9 @@ def test_options_reach_render_unchanged(scene: str, tmp_path: Path, monkeypatch:
         "probability": "history",
         "control": "auto",
         "sampler": "auto",
+        "shadow_cache": "auto",
+        "light_choice": "auto",
+        "next_event": "auto",
         "majorant_scale": 1.25,
         "step": None,
         "aov": ("cells", "null"),

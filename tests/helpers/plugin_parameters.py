@@ -35,6 +35,9 @@ CHOICES = {
     "probability": "max",
     "control": "min",
     "sampler": "sobol",
+    "shadow_cache": "off",
+    "light_choice": "power",
+    "next_event": "plain",
 }
 LIMITS = {
     "max_depth": 5,

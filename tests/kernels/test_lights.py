@@ -46,6 +46,7 @@ PRESENT = (
     "SHADING_NORMALS",
 )
 DEFINES = {"NEE": 1, "SPECTRUM": 3, "EXTINCTION": 1, "ONE_CHANNEL_PER_PATH": 0, "BVH_STACK": 1}
+DEFINES |= {"LIGHT_CHOICE": 0, "LIGHT_CACHE": 0}
 ABSENT = ("ENVMAP", "VERTEX_UVS")
 
 BUFFERS = {
@@ -116,7 +117,7 @@ __kernel void choose_kernel(ARGUMENTS, __global const float *in, __global float 
 {
     SCENE
     float choice = in[i];
-    out[2 * i] = (float)(choose_emitter(scene, &choice) - scene->emitters);
+    out[2 * i] = (float)choose_by_table(scene, &choice);
     out[2 * i + 1] = choice;
 }
 """
@@ -621,7 +622,7 @@ def test_lights_are_chosen_by_their_power_and_never_without(device):
         assert np.abs(counts - table["select_pdf"]).max() < 2.0**-15
         assert abs(table["select_pdf"].sum(dtype=float) - 1) < 1e-6
         of_points = table["kind"] == layout.enum("EMITTER", "point")
-        expected = powers[np.rint(table["vector"][of_points, 0]).astype(int)]
+        expected = powers[np.rint(table["position"][of_points, 0]).astype(int)]
         share = table["select_pdf"][of_points] / table["select_pdf"][of_points].sum()
         bright = expected > 1e-7
         assert np.allclose(share[bright], expected[bright] / powers.sum(), rtol=2e-4)

@@ -15,7 +15,7 @@ import pytest
 from places import ROOT, SCENES
 
 import clvol
-from clvol.planning.registry import AOVS, FAMILIES
+from clvol.planning.registry import AOVS, FAMILIES, option
 from clvol.scene.loader import PLUGINS
 
 DOCS = ROOT / "docs"
@@ -115,7 +115,7 @@ def test_every_method_that_is_cited_has_its_heading() -> None:
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_the_table_lists_every_choice(family: str) -> None:
-    [row] = re.findall(rf"^\| `--{family}` \| (.*) \|$", text_of("choices.md"), re.MULTILINE)
+    [row] = re.findall(rf"^\| `{option(family)}` \| (.*) \|$", text_of("choices.md"), re.MULTILINE)
     assert re.findall(r"`([\w-]+)`", row) == list(FAMILIES[family])
 
 

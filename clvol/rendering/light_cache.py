@@ -1,0 +1,48 @@
+"""Fills the cache of lights on the device, once per scene (cl/kernels/light_cache.cl)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pyopencl as cl
+
+from clvol.device.launch import run_kernel, scene_arguments
+from clvol.device.programs import build, light_cache_source
+from clvol.tables.light_cache import light_cache_record, rows, typical_radiance
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from clvol.device.device import Device
+    from clvol.tables.prepare import PreparedScene
+
+_PURPOSE = "the cache of lights", "choose shadow_cache off"
+
+
+def light_cache_buffers(
+    device: Device, prepared: PreparedScene, buffers: Mapping[str, cl.Buffer]
+) -> dict[str, cl.Buffer]:
+    """The cache's record and cells, by argument name; `buffers`: what the scene has beside them."""
+    plan, record = prepared.plan, light_cache_record(prepared)
+    cells = int(np.prod(record["size"]))
+    count = cells * rows(prepared)
+    program = build(device, light_cache_source(plan), "light_cache")
+    unused = device.memory.allocate(4, *_PURPOSE)
+    known = {**buffers, "light_cache": device.memory.upload(record, *_PURPOSE)}
+    arguments = scene_arguments(plan.macros, known, slot_stride=1, unused=unused)
+
+    def run(name: str, inputs: list[np.ndarray], outputs: list[np.ndarray]) -> None:
+        number = np.uint32(len(outputs[0]))
+        kernel = cl.Kernel(program, name)
+        run_kernel(device, kernel, len(outputs[0]), arguments, inputs, outputs, [number], purpose=_PURPOSE)
+
+    extinction = np.empty(cells, np.float32)
+    transmittance, received = np.empty(count, np.float32), np.empty(count, np.float32)
+    run("light_cache_extinction", [], [extinction])
+    run("light_cache_transmittance", [extinction], [transmittance, received])
+    record["typical"] = typical_radiance(extinction, received.reshape(-1, cells).sum(axis=0))
+    return {
+        "light_cache": device.memory.upload(record, *_PURPOSE),
+        "light_transmittance": device.memory.upload(transmittance, *_PURPOSE),
+    }
