@@ -43,6 +43,7 @@ def render(
     majorant: str = "auto",
     lookup: str = "auto",
     absorption: str = "auto",
+    gathering: str = "auto",
     probability: str = "auto",
     control: str = "auto",
     sampler: str = "auto",
@@ -68,7 +69,7 @@ def render(
         From `load_file` or `load_dict`.
     spp, seed
         Samples per pixel and 64-bit seed. They default to the scene's.
-    technique, transmittance, majorant, lookup, absorption, probability, control
+    technique, transmittance, majorant, lookup, absorption, gathering, probability, control
         Names from `clvol.planning.registry`. "auto" takes the scene's own choice, else follows fixed rules,
         so that the same seed gives the same bits. Technique "auto:pilot" has a short measured pilot choose
         technique, transmittance and majorant, where they are left at "auto". ``result.metadata["repeat"]``
@@ -175,8 +176,8 @@ def plan(scene: Scene, **choices: Any) -> Plan:
     Parameters
     ----------
     scene : from `load_file` or `load_dict`.
-    choices : technique, transmittance, majorant, lookup, absorption, probability, control, sampler,
-        shadow_cache, light_choice, next_event, majorant_scale, step, target_error, aov, as for `render`.
+    choices : technique, transmittance, majorant, lookup, absorption, gathering, probability, control,
+        sampler, shadow_cache, light_choice, next_event, majorant_scale, step, target_error, aov, as for `render`.
 
     Returns
     -------

@@ -4,29 +4,106 @@
 #ifndef CLVOL_DENSITY_SEGMENTS_H
 #define CLVOL_DENSITY_SEGMENTS_H
 #include "density/volume.h"
-#include "geometry/lattice.h"
 #include "tracking/walk.h"
 
-/* Starts the segments of [t, t_end] of the ray; their parameters count from t. */
-INLINE LatticeWalk segments_begin(const MediumRay *in, float t, float t_end)
+/* The walk through the segments of a stretch of the ray.  Each axis is mirrored where the direction is negative, so
+   that planes are crossed in the order of their numbers.  No step branches on the axis that it crosses, which no
+   processor can predict, and none waits for what the one before looked up. */
+typedef struct {
+    float3 start; /* of the stretch, mirrored, in units in which planes are integers */
+    float3 inverse_d;
+    float3 plane; /* next on each axis */
+    float3 last;  /* the clamped borders beyond are segments of their own */
+    float3 reach; /* where the planes are crossed */
+    float t;      /* the current segment is [t, t_end], from the start of the stretch */
+    float t_end;
+    float length;
+} SegmentWalk;
+
+INLINE void segments_reach(SegmentWalk *walk)
+{
+    walk->reach = walk->plane <= walk->last ? (walk->plane - walk->start) * walk->inverse_d : (float3)(INFINITY);
+}
+
+/* Starts the segments of the ray from t on; their parameters count from there. */
+INLINE SegmentWalk segments_begin(const MediumRay *in, float t, float t_end)
 {
     __global const Volume *volume = in->scene->volumes + in->medium->sigma_t_volume;
     const bool nearest = volume_is_nearest(volume);
-    const int more = nearest ? 0 : 1; /* the clamped borders are segments of their own */
-    Ray ray = in->index_ray;
-    ray.o += t * ray.d + (nearest ? 0.5f : 1.0f);
-    return lattice_begin(ray, volume->size[0] + more, volume->size[1] + more, volume->size[2] + more, 1.0f, t_end - t);
+    const float less = nearest ? 1.0f : 0.0f;
+    const float3 d = in->index_ray.d, p = in->index_ray.o + t * d + (nearest ? -0.5f : 0.0f);
+    const float3 size = (float3)((float)volume->size[0], (float)volume->size[1], (float)volume->size[2]);
+    const float3 most = size - 1.0f - less;
+    SegmentWalk walk;
+    walk.start = d < 0.0f ? -p : p;
+    walk.inverse_d = 1.0f / (d < 0.0f ? -d : d);
+    walk.last = d < 0.0f ? (float3)(0.0f) : most;
+    const float3 first = d < 0.0f ? -most : (float3)(0.0f);
+    walk.plane.x = max_of((float)floor_int(walk.start.x) + 1.0f, first.x);
+    walk.plane.y = max_of((float)floor_int(walk.start.y) + 1.0f, first.y);
+    walk.plane.z = max_of((float)floor_int(walk.start.z) + 1.0f, first.z);
+    walk.t_end = 0.0f;
+    walk.length = t_end - t;
+    segments_reach(&walk);
+    return walk;
+}
+
+/* Moves on to the next segment; false at the end of the stretch. */
+INLINE bool segments_next(SegmentWalk *walk)
+{
+    walk->t = walk->t_end;
+    const float3 reach = walk->reach;
+    const float next = min_of(reach.x, min_of(reach.y, reach.z));
+    walk->plane += reach <= next ? (float3)(1.0f) : (float3)(0.0f);
+    segments_reach(walk);
+    walk->t_end = min_of(next, walk->length);
+    return walk->t < walk->length;
+}
+
+/* The one interpolation cell that a segment lies in: its samples are found once for all points of the segment. */
+typedef struct {
+    VolumeCell cell;
+    float3 middle; /* of the segment, from the cell's first corner; outside of it where borders are clamped */
+    float half_length;
+    bool nearest;
+} SegmentCell;
+
+/* sigma_t at a point of the segment, `offset` from its middle. */
+INLINE Extinction segment_value(const MediumRay *in, const SegmentCell *at, float offset)
+{
+    VolumeCell cell = at->cell;
+    const float3 place = at->middle + offset * in->index_ray.d;
+    cell.fx = clamp_to(place.x, 0.0f, 1.0f);
+    cell.fy = clamp_to(place.y, 0.0f, 1.0f);
+    cell.fz = clamp_to(place.z, 0.0f, 1.0f);
+#if CLVOL_EXTINCTION == 3 && CLVOL_HAS_COLOURED_VOLUME
+    return in->scale * cell_value3(&cell, at->nearest);
+#else
+    return in->scale * cell_value(&cell, at->nearest, cell.stride > 1 ? in->channel : 0);
+#endif
+}
+
+/* start: of the walk, in index space. */
+INLINE SegmentCell segment_cell(const MediumRay *in, float3 start, float t, float t_end, Tally *tally)
+{
+    __global const Volume *volume = in->scene->volumes + in->medium->sigma_t_volume;
+    const float3 p = start + 0.5f * (t_end + t) * in->index_ray.d;
+    SegmentCell at;
+    at.cell = volume_cell(in->scene, volume, p);
+    at.middle = p - (float3)((float)cell_place(p.x, volume->size[0]), (float)cell_place(p.y, volume->size[1]),
+                             (float)cell_place(p.z, volume->size[2]));
+    at.half_length = 0.5f * (t_end - t);
+    at.nearest = volume_is_nearest(volume);
+    tally->lookups += 1;
+    RECORD_LOOKUP(in, p, segment_value(in, &at, 0.0f), tally);
+    return at;
 }
 
 /* Optical depth of a segment. */
-INLINE Extinction segment_depth(const MediumRay *in, float3 start, const LatticeWalk *segment, Stream *stream,
-                                Tally *tally)
+INLINE Extinction segment_depth(const MediumRay *in, const SegmentCell *at)
 {
-    const float half_length = 0.5f * (segment->t_end - segment->t), middle = 0.5f * (segment->t_end + segment->t);
-    const float offset = half_length * 0.57735026919f;
-    const Extinction a = extinction_at(in, start + (middle - offset) * in->index_ray.d, stream, tally);
-    const Extinction b = extinction_at(in, start + (middle + offset) * in->index_ray.d, stream, tally);
-    return half_length * (a + b);
+    const float offset = at->half_length * 0.57735026919f;
+    return at->half_length * (segment_value(in, at, -offset) + segment_value(in, at, offset));
 }
 
 /* sigma_t = a + b w + c w² + d w³ over a segment, w from 0 at its start to 8 at its end. */
@@ -34,13 +111,11 @@ typedef struct {
     Extinction a, b, c, d;
 } Cubic;
 
-INLINE Cubic segment_cubic(const MediumRay *in, float3 start, const LatticeWalk *segment, Stream *stream, Tally *tally)
+INLINE Cubic segment_cubic(const MediumRay *in, const SegmentCell *at)
 {
-    const float unit = 0.125f * (segment->t_end - segment->t);
-    const Extinction f1 = extinction_at(in, start + (segment->t + unit) * in->index_ray.d, stream, tally);
-    const Extinction f3 = extinction_at(in, start + (segment->t + 3.0f * unit) * in->index_ray.d, stream, tally);
-    const Extinction f5 = extinction_at(in, start + (segment->t + 5.0f * unit) * in->index_ray.d, stream, tally);
-    const Extinction f7 = extinction_at(in, start + (segment->t + 7.0f * unit) * in->index_ray.d, stream, tally);
+    const float unit = 0.25f * at->half_length;
+    const Extinction f1 = segment_value(in, at, -3.0f * unit), f3 = segment_value(in, at, -unit);
+    const Extinction f5 = segment_value(in, at, unit), f7 = segment_value(in, at, 3.0f * unit);
     /* through the four values, about the middle w = 4, then moved to the start */
     const Extinction inner = 0.5f * (f5 - f3), outer = 0.5f * (f7 - f1);
     const Extinction d = (outer - 3.0f * inner) * (1.0f / 24.0f), b = inner - d;

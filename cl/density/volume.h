@@ -31,6 +31,9 @@ INLINE uint volume_brick(const Scene *scene, __global const Volume *volume, int 
     return (uint)scene->tops[volume->top_offset + (z * volume->bricks[1] + y) * volume->bricks[0] + x];
 }
 
+/* Number of the cell that holds a coordinate, along an axis of so many samples. */
+INLINE int cell_place(float x, int size) { return min_int((int)clamp_to(x, 0.0f, (float)(size - 1)), size - 2); }
+
 INLINE VolumeCell volume_cell(const Scene *scene, __global const Volume *volume, float3 p)
 {
     const float x = clamp_to(p.x, 0.0f, (float)(volume->size[0] - 1));
@@ -89,14 +92,18 @@ INLINE float volume_value(const Scene *scene, __global const Volume *volume, flo
 }
 
 /* All channels at once. */
+INLINE float3 cell_value3(const VolumeCell *cell, bool nearest)
+{
+    const float first = cell_value(cell, nearest, 0);
+    if (cell->stride == 1)
+        return (float3)(first);
+    return (float3)(first, cell_value(cell, nearest, 1), cell_value(cell, nearest, 2));
+}
+
 INLINE float3 volume_value3(const Scene *scene, __global const Volume *volume, float3 p)
 {
     const VolumeCell cell = volume_cell(scene, volume, p);
-    const bool nearest = volume_is_nearest(volume);
-    const float first = cell_value(&cell, nearest, 0);
-    if (cell.stride == 1)
-        return (float3)(first);
-    return (float3)(first, cell_value(&cell, nearest, 1), cell_value(&cell, nearest, 2));
+    return cell_value3(&cell, volume_is_nearest(volume));
 }
 
 /* Value as a path carries it. */

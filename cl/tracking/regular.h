@@ -1,7 +1,8 @@
 /* Regular tracking: the free flight by inverting the exact optical depth, segment by segment; no tentative
    collisions, no noise but that of the distance itself (Sutton et al. 1999; METHODS §3).
 
-   Emission is gathered at the collision, but along the way where the medium is thin.
+   Emission is gathered at the collision, or at strata of the flight (tracking/strata.h), but along the way where the
+   medium is thin (tracking/track.h).
 
    The majorant only tells where the medium is empty.  Several channels: the flight is drawn from one and
    weighted over the mixture (tracking/channels.h). */
@@ -9,6 +10,8 @@
 #include "majorant/majorant.h"
 #include "tracking/channels.h"
 #include "tracking/collision.h"
+#include "tracking/strata.h"
+#include "tracking/track.h"
 
 #define NEWTON_STEPS 16
 
@@ -36,99 +39,81 @@ INLINE float invert_cubic(const Cubic *cubic, int channel, float target)
     return w;
 }
 
-/* Optical depth, of the channel that has most, up to which emission is gathered along the way: thin media have hardly
-   a collision to gather it at.  Beyond, collisions gather it with less noise. */
-#define TRACK_DEPTH 0.01f
-
-/* The segments of a flight that end within TRACK_DEPTH, of which one is drawn in proportion to its optical depth. */
+/* A flight under way. */
 typedef struct {
-    float total;     /* of their optical depths */
-    float t, length; /* the segment drawn, as far as the flight goes */
-    float part;      /* its optical depth */
-    Extinction depth; /* up to it */
-} Track;
+    Spectrum beta;    /* at its start */
+    int channel;      /* that it is drawn from */
+    Extinction depth; /* flown through */
+    Strata strata;
+    bool collided;
+} ExactFlight;
 
-INLINE bool is_tracked(Extinction depth_after)
+/* Meets the points of the flight's strata that lie in the cell's segment, which begins at t; returns how far it was
+   walked for them: to its end, or to the last point. */
+INLINE float meet_points(const MediumRay *in, const SegmentCell *cell, float t, Extinction part, bool tracked,
+                         ExactFlight *flight, Extinction *walked, Tally *tally, Collision *collision)
 {
-    return CLVOL_EMISSION_ON_WALKS && extinction_max(depth_after) <= TRACK_DEPTH;
-}
-
-INLINE void track_add(Track *track, float t, float length, Extinction depth, Extinction part, Stream *stream)
-{
-    const float size = extinction_max(part);
-    if (choose_event(stream_pair(stream).x, size, track->total)) {
-        track->t = t;
-        track->length = length;
-        track->part = size;
-        track->depth = depth;
-    }
-    track->total += size;
-}
-
-/* Gathers the emission of the track, estimated at one point; collision->beta is still that of the flight's start.
-   A flight gets there with the transmittance as its probability, or the mixture of them that `balanced` weights by. */
-INLINE void gather_track(const MediumRay *in, const Track *track, Stream *stream, Tally *tally, Collision *collision)
-{
-    if (!(track->total > 0.0f))
-        return;
-    const float t = track->t + uniform_float(stream_pair(stream).x) * track->length;
-    const float3 start = in->index_ray.o + track->t * in->index_ray.d;
-    const Extinction sigma_t = extinction_at(in, in->index_ray.o + t * in->index_ray.d, stream, tally);
-    Spectrum beta = collision->beta;
-#if CLVOL_EXTINCTION == 3
-    LatticeWalk flown;
-    flown.t = 0.0f;
-    flown.t_end = t - track->t;
-    beta = balanced(beta, (Extinction)(1.0f), track->depth + segment_depth(in, start, &flown, stream, tally));
-#endif
-    collect_emission(in, t, beta * (sigma_t * (track->length * track->total / track->part)), collision);
+    *walked = part;
+    const Extinction after = flight->depth + part;
+    if (channel_of(after, flight->channel) < flight->strata.target)
+        return 2.0f * cell->half_length;
+    const Cubic cubic = segment_cubic(in, cell);
+    const float unit = 0.25f * cell->half_length;
+    do {
+        const float rest = flight->strata.target - channel_of(flight->depth, flight->channel);
+        const float w = invert_cubic(&cubic, flight->channel, rest / unit);
+        const Extinction depth = unit * cubic_integral(&cubic, w);
+        const Spectrum beta = balanced(flight->beta, cubic_value(&cubic, w), flight->depth + depth);
+        if (!tracked)
+            collect_emission(in, t + w * unit, flight->strata.share * beta, collision);
+        if (strata_collide(&flight->strata)) {
+            flight->collided = true;
+            collision->beta = beta;
+            tally->tentative += 1;
+            real_collision(t + w * unit, tally, collision);
+        }
+        if (!strata_next(&flight->strata)) {
+            *walked = depth;
+            return w * unit;
+        }
+    } while (channel_of(after, flight->channel) >= flight->strata.target);
+    return 2.0f * cell->half_length;
 }
 
 INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Tally *tally, Collision *collision)
 {
-    const float target = exponential_variate(first);
-    const int channel = pick_channel(collision->beta, stream_pair(stream));
-    Extinction depth = (Extinction)(0.0f);
+    ExactFlight flight;
+    flight.beta = collision->beta;
+    flight.channel = pick_channel(flight.beta, stream_pair(stream));
+    flight.depth = (Extinction)(0.0f);
+    flight.strata = strata_begin(in, first);
+    flight.collided = false;
     Track track = {0.0f, 0.0f, 0.0f, 0.0f, (Extinction)(0.0f)};
     uint steps = WALK_STEPS;
     MajorantWalk walk = majorant_begin(in);
-    while (majorant_next(in, &walk)) {
+    while (steps > 0 && flight.strata.left && majorant_next(in, &walk)) {
         tally->cells += 1;
         if (walk.majorant == 0.0f)
             continue;
         const float3 start = in->index_ray.o + walk.t * in->index_ray.d;
-        LatticeWalk segment = segments_begin(in, walk.t, walk.t_end);
-        while (lattice_next(&segment)) {
-            const Extinction part = segment_depth(in, start, &segment, stream, tally);
-            if (channel_of(depth + part, channel) >= target) {
-                const Cubic cubic = segment_cubic(in, start, &segment, stream, tally);
-                const float unit = 0.125f * (segment.t_end - segment.t);
-                const float w = invert_cubic(&cubic, channel, (target - channel_of(depth, channel)) / unit);
-                const float t = walk.t + segment.t + w * unit;
-                const Extinction integral = cubic_integral(&cubic, w);
-                const bool tracked = is_tracked(depth + part);
-                if (tracked)
-                    track_add(&track, walk.t + segment.t, w * unit, depth, unit * integral, stream);
-                gather_track(in, &track, stream, tally, collision);
-                depth += unit * integral;
-                collision->beta = balanced(collision->beta, cubic_value(&cubic, w), depth);
-                if (!tracked)
-                    collect_emission(in, t, collision->beta, collision);
-                tally->tentative += 1;
-                return real_collision(t, tally, collision);
-            }
-            if (is_tracked(depth + part))
-                track_add(&track, walk.t + segment.t, segment.t_end - segment.t, depth, part, stream);
-            depth += part;
-            if (--steps == 0) {
-                stop_walk(walk.t + segment.t_end, tally);
-                break;
-            }
+        SegmentWalk segment = segments_begin(in, walk.t, walk.t_end);
+        while (steps > 0 && flight.strata.left && segments_next(&segment)) {
+            const SegmentCell cell = segment_cell(in, start, segment.t, segment.t_end, tally);
+            const Extinction part = segment_depth(in, &cell);
+            const bool tracked = is_tracked(flight.depth + part);
+            Extinction walked;
+            const float length = meet_points(in, &cell, walk.t + segment.t, part, tracked, &flight, &walked, tally,
+                                             collision);
+            if (tracked)
+                track_add(&track, walk.t + segment.t, length, flight.depth, walked, stream);
+            flight.depth += walked;
+            steps -= 1;
         }
-        if (steps == 0)
-            break;
+        if (steps == 0 && flight.strata.left && !flight.collided) /* one that collided has no next leg */
+            stop_walk(walk.t + segment.t_end, tally);
     }
-    gather_track(in, &track, stream, tally, collision);
-    collision->beta = balanced(collision->beta, (Extinction)(1.0f), depth);
-    return false;
+    gather_track(in, flight.beta, &track, stream, tally, collision);
+    if (!flight.collided)
+        collision->beta = balanced(flight.beta, (Extinction)(1.0f), flight.depth);
+    return flight.collided;
 }

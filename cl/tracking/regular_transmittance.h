@@ -14,9 +14,10 @@ INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream
         if (walk.majorant == 0.0f)
             continue;
         const float3 start = in->index_ray.o + walk.t * in->index_ray.d;
-        LatticeWalk segment = segments_begin(in, walk.t, walk.t_end);
-        while (lattice_next(&segment)) {
-            depth += segment_depth(in, start, &segment, stream, tally);
+        SegmentWalk segment = segments_begin(in, walk.t, walk.t_end);
+        while (segments_next(&segment)) {
+            const SegmentCell cell = segment_cell(in, start, segment.t, segment.t_end, tally);
+            depth += segment_depth(in, &cell);
             if (--steps == 0) {
                 stop_walk(walk.t + segment.t_end, tally);
                 return exp_of_minus(depth);

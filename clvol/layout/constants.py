@@ -35,6 +35,9 @@ RANDOMIZATIONS = 4
 MOST_WEIGHED_LIGHTS = 16
 """Lights, the strongest, that the choice among lights tells apart by what they bring to a point."""
 
+FLIGHT_STRATA = 8
+"""Points of an exact flight at which emission is gathered, if at several; a power of two."""
+
 COAT_ENTRIES = 64
 """Entries of the table of what a rough plastic's coat lets through, over the cosine of incidence."""
 

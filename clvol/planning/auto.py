@@ -40,6 +40,7 @@ def resolve(
         ),
         "lookup": ("exact", "the volume's own filter"),
         "absorption": ("mixed", "no path is absorbed that weighs much, none followed that weighs little"),
+        "gathering": ("strata", "a point in each stratum of a flight has a fraction of one point's noise"),
         "probability": ("history", "weights stay bounded"),
         "control": ("mean", "leaves the least residual to estimate"),
         "shadow_cache": ("on", "shadow rays that would bring next to nothing are rarely traced"),

@@ -42,6 +42,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_DENSITY_CHANNELS": 3 if f.coloured_extinction else 1,
         "CLVOL_EMISSION_ON_WALKS": int(f.emission and not f.media_overlap),
         "CLVOL_EMISSION_AT_COLLISIONS": int(f.emission and f.media_overlap),
+        "CLVOL_FLIGHT_STRATA": plan.flight_strata,
         "CLVOL_HAS_EMISSION_VOLUME": int(f.emission_volumes),
         "CLVOL_HAS_TEMPERATURE": int(f.temperature),
         **{f"CLVOL_PHASE_{name}": int(name in f.phases) for name in layout.ENUMS["PHASE"]},

@@ -137,6 +137,19 @@ class Decisions:
         return self.nee and (f.constant or f.envmap or f.area)
 
     @property
+    def gathers_on_flights(self) -> bool:
+        """Exact flights meet emission; in media that overlap, the collision that counts alone does."""
+        f = self.features
+        emits = f.heterogeneous and f.emission and not f.media_overlap
+        return emits and self.chosen["technique"] == "regular"
+
+    @property
+    def flight_strata(self) -> int:
+        """Points of an exact flight at which emission is gathered."""
+        strata = self.gathers_on_flights and self.chosen["gathering"] == "strata"
+        return layout.FLIGHT_STRATA if strata else 1
+
+    @property
     def walks_majorants(self) -> bool:
         """Some stage walks majorant cells."""
         shadows = self.nee and self.estimator.walks_majorant

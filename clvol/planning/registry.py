@@ -136,6 +136,10 @@ PROBABILITIES = {
     "average": Choice("events in proportion to the mean coefficient of the channels"),
     "max": Choice("events in proportion to the largest coefficient of the channels"),
 }
+GATHERINGS = {
+    "collision": Choice("at the collision"),
+    "strata": Choice("at strata of the whole flight, the collision's among them: less noise, longer walks"),
+}
 CONTROLS = {
     "mean": Choice("the mean density of each majorant cell, less where thick cells may have gaps"),
     "min": Choice("the least density of each majorant cell"),
@@ -173,6 +177,7 @@ FAMILIES = {
     "majorant": MAJORANTS,
     "lookup": LOOKUPS,
     "absorption": ABSORPTIONS,
+    "gathering": GATHERINGS,
     "probability": PROBABILITIES,
     "control": CONTROLS,
     "sampler": SAMPLERS,
@@ -186,6 +191,7 @@ FAMILY_PURPOSE = {
     "majorant": "What bounds the extinction.",
     "lookup": "How the density is looked up.",
     "absorption": "How absorption is treated.",
+    "gathering": "Where exact flights gather emission.",
     "probability": "How a spectral technique chooses events.",
     "control": "What residual-ratio subtracts.",
     "sampler": "How the samples of a pixel are drawn.",

@@ -16,6 +16,7 @@ CHOICES = (
     "majorant",
     "lookup",
     "absorption",
+    "gathering",
     "probability",
     "control",
     "sampler",

@@ -273,6 +273,7 @@ def test_options_reach_render_unchanged(scene: str, tmp_path: Path, monkeypatch:
         "majorant": "grid",
         "lookup": "auto",
         "absorption": "auto",
+        "gathering": "auto",
         "probability": "history",
         "control": "auto",
         "sampler": "auto",

@@ -32,6 +32,7 @@ CHOICES = {
     "majorant": "grid",
     "lookup": "exact",
     "absorption": "weight",
+    "gathering": "collision",
     "probability": "max",
     "control": "min",
     "sampler": "sobol",
