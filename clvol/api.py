@@ -177,7 +177,8 @@ def plan(scene: Scene, **choices: Any) -> Plan:
     ----------
     scene : from `load_file` or `load_dict`.
     choices : technique, transmittance, majorant, lookup, absorption, gathering, probability, control,
-        sampler, shadow_cache, light_choice, next_event, majorant_scale, step, target_error, aov, as for `render`.
+        sampler, shadow_cache, light_choice, next_event, majorant_scale, step, target_error, aov, as for
+        `render`.
 
     Returns
     -------
