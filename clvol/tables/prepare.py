@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 from clvol.planning.plan import Plan
 from clvol.planning.refusals import refuse_fine_step
@@ -13,13 +14,14 @@ from clvol.scene.medium_facts import Matter, number_matter
 from clvol.scene.thinness import check_thinness
 from clvol.tables.apart import channels_apart
 from clvol.tables.camera_medium import check_camera_medium
-from clvol.tables.majorants import PreparedMajorant, choose_majorants
+from clvol.tables.majorants import Majorants, PreparedMajorant, choose_majorants
 from clvol.tables.surfaces import Surfaces, prepare_surfaces
 from clvol.tables.volumes import PreparedVolume, check_cover, prepare_volume
 
 if TYPE_CHECKING:
     import numpy as np
 
+    from clvol.planning.needs import MajorantNeeds
     from clvol.scene.boundaries import Boundaries
     from clvol.scene.records import Scene
 
@@ -82,24 +84,54 @@ def prepare(scene: Scene, plan: Plan | None = None) -> PreparedScene:
         The marching step is too fine.
     """
     plan = plan or Plan.of(scene)
-    found = plan.boundaries
-    check_camera_medium(scene, found)
-    check_thinness(scene, found)
-    centre, radius = scene_sphere(scene, found)
-    refuse_fine_step(plan.choices.step, radius)
-    matter = number_matter([entry.medium for entry in found.entries])
-    for medium in matter.media:
-        check_cover(medium)
-    volumes = tuple(prepare_volume(volume, centre) for volume in matter.volumes)
-    majorants = choose_majorants(matter, volumes, plan.needs)
-    surfaces = prepare_surfaces(scene, found, centre)
+    if scene not in _KEPT:
+        _KEPT[scene] = _Kept.of(scene, plan.boundaries)
+    kept = _KEPT[scene]
+    refuse_fine_step(plan.choices.step, kept.radius)
+    majorants = kept.majorants(plan.needs)
     settled = Settled(
         majorants.kind,
         majorants.costs,
-        channels_apart(matter, volumes),
-        top_trees=any(volume.bricks.levels for volume in volumes),
+        channels_apart(kept.matter, kept.volumes),
+        top_trees=any(volume.bricks.levels for volume in kept.volumes),
         tree_grid=any(table is not None and table.links is not None for table in majorants.tables),
     )
-    return PreparedScene(
-        scene, plan.settle(settled), centre, radius, surfaces, matter, volumes, majorants.tables
-    )
+    parts = kept.centre, kept.radius, kept.surfaces, kept.matter, kept.volumes
+    return PreparedScene(scene, plan.settle(settled), *parts, majorants.tables)
+
+
+@dataclass(eq=False)
+class _Kept:
+    """What is worked out about a scene, whatever is planned for it, and the majorants of its latest plan.
+
+    It holds neither samples of bricks nor the scene: a few hundredths of what the volumes take.
+    """
+
+    centre: np.ndarray
+    radius: float
+    surfaces: Surfaces | None
+    matter: Matter
+    volumes: tuple[PreparedVolume, ...]
+    latest: tuple[MajorantNeeds, Majorants] | None = None
+
+    @classmethod
+    def of(cls, scene: Scene, found: Boundaries) -> _Kept:
+        """Work it out, and check the scene."""
+        check_camera_medium(scene, found)
+        check_thinness(scene, found)
+        centre, radius = scene_sphere(scene, found)
+        matter = number_matter([entry.medium for entry in found.entries])
+        for medium in matter.media:
+            check_cover(medium)
+        volumes = tuple(prepare_volume(volume, centre) for volume in matter.volumes)
+        return cls(centre, radius, prepare_surfaces(scene, found, centre), matter, volumes)
+
+    def majorants(self, needs: MajorantNeeds) -> Majorants:
+        """Majorants that have what is needed of them."""
+        if self.latest is None or self.latest[0] != needs:
+            self.latest = needs, choose_majorants(self.matter, self.volumes, needs)
+        return self.latest[1]
+
+
+_KEPT: WeakKeyDictionary[Scene, _Kept] = WeakKeyDictionary()
+"""Of every scene that there still is: one that is rendered again has its tables."""

@@ -166,14 +166,20 @@ def _dense_size(grid: DenseGrid) -> tuple[int, int, int]:
 
 
 def _slabs(grid: DenseGrid) -> Iterator[np.ndarray]:
-    """The samples of each layer of bricks, float32 (9, 8by + 1, 8bx + 1, channels), borders repeated."""
+    """The samples of each layer of bricks, float32 (9, 8by + 1, 8bx + 1, channels), borders repeated.
+
+    Each is overwritten by the next.
+    """
     bz, by, bx = bricks_over(_dense_size(grid))
-    nz, ny, nx, _ = grid.values.shape
-    ys = np.minimum(np.arange(by * BRICK_CELLS + 1), ny - 1)
-    xs = np.minimum(np.arange(bx * BRICK_CELLS + 1), nx - 1)
+    _, ny, nx, channels = grid.values.shape
+    slab = np.empty((BRICK_EDGE, by * BRICK_CELLS + 1, bx * BRICK_CELLS + 1, channels), np.float32)
     for z in range(0, bz * BRICK_CELLS, BRICK_CELLS):
-        zs = np.minimum(np.arange(z, z + BRICK_EDGE), nz - 1)
-        yield grid.values[zs[0] : zs[-1] + 1][np.ix_(zs - zs[0], ys, xs)]
+        samples = grid.values[z : z + BRICK_EDGE]
+        slab[: len(samples), :ny, :nx] = samples
+        slab[len(samples) :, :ny, :nx] = samples[-1]
+        slab[:, ny:, :nx] = slab[:, ny - 1 : ny, :nx]
+        slab[:, :, nx:] = slab[:, :, nx - 1 : nx]
+        yield slab
 
 
 def _extrema_dense(grid: DenseGrid) -> tuple[np.ndarray, np.ndarray]:
