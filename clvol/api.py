@@ -50,6 +50,7 @@ def render(
     shadow_cache: str = "auto",
     light_choice: str = "auto",
     next_event: str = "auto",
+    lanes: str = "auto",
     majorant_scale: float = 1.0,
     step: float | None = None,
     aov: Sequence[str] = (),
@@ -74,7 +75,7 @@ def render(
         so that the same seed gives the same bits. Technique "auto:pilot" has a short measured pilot choose
         technique, transmittance and majorant, where they are left at "auto". ``result.metadata["repeat"]``
         says what it chose.
-    sampler, shadow_cache, light_choice, next_event
+    sampler, shadow_cache, light_choice, next_event, lanes
         Names from there too.
     majorant_scale
         Multiplies every bound of the density, for experiments. A factor below 1 is only for techniques and
@@ -177,8 +178,8 @@ def plan(scene: Scene, **choices: Any) -> Plan:
     ----------
     scene : from `load_file` or `load_dict`.
     choices : technique, transmittance, majorant, lookup, absorption, gathering, probability, control,
-        sampler, shadow_cache, light_choice, next_event, majorant_scale, step, target_error, aov, as for
-        `render`.
+        sampler, shadow_cache, light_choice, next_event, lanes, majorant_scale, step, target_error, aov,
+        as for `render`.
 
     Returns
     -------

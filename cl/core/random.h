@@ -71,9 +71,29 @@ INLINE uint2 stream_pair(Stream *stream)
     return (uint2)((uint)z, (uint)(z >> 32));
 }
 
+/* -ln of 2^exponent (1 + r), for 1 + r between the roots of 1/2 and 2: Cephes' logf, relative error below 1e-7.
+   For numbers of any type, so that lanes share it. */
+#define DEFINE_MINUS_LOG(name, Number) \
+    INLINE Number name(Number r, Number exponent) \
+    { \
+        Number poly = 7.0376836292e-2f * r - 1.1514610310e-1f; \
+        poly = poly * r + 1.1676998740e-1f; \
+        poly = poly * r - 1.2420140846e-1f; \
+        poly = poly * r + 1.4249322787e-1f; \
+        poly = poly * r - 1.6668057665e-1f; \
+        poly = poly * r + 2.0000714765e-1f; \
+        poly = poly * r - 2.4999993993e-1f; \
+        poly = poly * r + 3.3333331174e-1f; \
+        const Number r2 = r * r; \
+        const Number log_value = poly * r * r2 - exponent * 2.12194440e-4f - 0.5f * r2 + r; \
+        return -(exponent * 0.693359375f + log_value); \
+    }
+
+DEFINE_MINUS_LOG(minus_log, float)
+
 /* Exponential variate with mean 1 from a full 32-bit number: -ln(1 - (k+1/2)/2^32), with full relative
    precision at both ends (METHODS §7).  Near 1 the argument of the logarithm is kept as its distance
-   from 1.  Polynomial: Cephes logf, relative error below 1e-7. */
+   from 1. */
 INLINE float exponential_variate(uint k)
 {
     const bool lower_half = k < 0x80000000u;
@@ -83,18 +103,7 @@ INLINE float exponential_variate(uint k)
     const uint shifted = bits - 0x3F3504F3u; /* mantissa into [sqrt_of(1/2), sqrt_of(2)) */
     const float exponent = near_one ? 0.0f : (float)((int)shifted >> 23);
     const float r = near_one ? -tail : as_float((shifted & 0x007FFFFFu) + 0x3F3504F3u) - 1.0f;
-    float poly = 7.0376836292e-2f;
-    poly = poly * r - 1.1514610310e-1f;
-    poly = poly * r + 1.1676998740e-1f;
-    poly = poly * r - 1.2420140846e-1f;
-    poly = poly * r + 1.4249322787e-1f;
-    poly = poly * r - 1.6668057665e-1f;
-    poly = poly * r + 2.0000714765e-1f;
-    poly = poly * r - 2.4999993993e-1f;
-    poly = poly * r + 3.3333331174e-1f;
-    const float r2 = r * r;
-    const float log_value = poly * r * r2 - exponent * 2.12194440e-4f - 0.5f * r2 + r;
-    return -(exponent * 0.693359375f + log_value);
+    return minus_log(r, exponent);
 }
 
 /* Whether an event of rate `part` happens among a total rate `part + rest`, at full resolution for

@@ -7,6 +7,7 @@
 #ifndef CLVOL_DENSITY_STOCHASTIC_H
 #define CLVOL_DENSITY_STOCHASTIC_H
 #include "core/random.h"
+#include "density/lanes.h"
 #include "density/volume.h"
 
 INLINE int drawn_corner(const VolumeCell *cell, bool nearest, Stream *stream)
@@ -32,5 +33,19 @@ INLINE float3 density3(const Scene *scene, __global const Volume *volume, float3
     __global const float *value = cell.corner + drawn_corner(&cell, volume_is_nearest(volume), stream);
     return cell.stride > 1 ? (float3)(value[0], value[1], value[2]) : (float3)(value[0]);
 }
+
+#if CLVOL_LANES
+INLINE Real lane_density(const LaneVolume *volume, Real x, Real y, Real z, Int channel, Int draws, LaneStream *stream)
+{
+    const LaneCell cell = lane_cell(volume, x, y, z, channel);
+    const Real middle = (Real)(0.5f), unit = (Real)(0x1p-21f), half_unit = (Real)(0x1p-22f);
+    if (volume->nearest)
+        return lane_sample(volume, &cell, middle, middle, middle);
+    const BitsPair k = lane_pair(stream, draws);
+    const Int last = bits_int((k.x & 0x7FFu) << 10 | (k.y & 0x3FFu));
+    return lane_sample(volume, &cell, to_real(bits_int(k.x >> 11)) * unit + half_unit,
+                       to_real(bits_int(k.y >> 11)) * unit + half_unit, to_real(last) * unit + half_unit);
+}
+#endif
 
 #endif

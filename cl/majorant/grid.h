@@ -28,7 +28,11 @@ INLINE bool majorant_next(const MediumRay *in, MajorantWalk *walk)
     walk->t = walk->lattice.t;
     walk->t_end = walk->lattice.t_end;
     walk->cell = walk->lattice.cell;
-    walk->majorant = in->rate * in->scene->majorants[in->medium->cell_offset + walk->cell];
+    float bound = in->scene->majorants[in->medium->cell_offset + walk->cell];
+#if CLVOL_HAS_LANES
+    bound = max_of(bound, 0.0f); /* the mark of an empty block */
+#endif
+    walk->majorant = in->rate * bound;
     return true;
 }
 

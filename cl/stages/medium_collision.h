@@ -13,15 +13,23 @@
 #endif
 #include "tracking/homogeneous.h"
 
-/* Where the path's walk begins, at `from`, or goes on, which is said once. */
-INLINE Walked take_walked(const Scene *scene, uint slot, float from)
+/* Where the path's walk begins, at `from`, or goes on. */
+INLINE Walked walked_so_far(const Scene *scene, uint slot, float from)
 {
     Walked walked = {path_leg(scene, slot), from, 0.0f};
     if (walked.leg > 0) {
-        set_path_leg(scene, slot, 0);
         walked.t = path_walked(scene, slot);
         walked.rest = path_walked_rest(scene, slot);
     }
+    return walked;
+}
+
+/* The same, said once. */
+INLINE Walked take_walked(const Scene *scene, uint slot, float from)
+{
+    const Walked walked = walked_so_far(scene, slot, from);
+    if (walked.leg > 0)
+        set_path_leg(scene, slot, 0);
     return walked;
 }
 

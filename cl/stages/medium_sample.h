@@ -2,7 +2,9 @@
 #ifndef CLVOL_STAGES_MEDIUM_SAMPLE_H
 #define CLVOL_STAGES_MEDIUM_SAMPLE_H
 #if CLVOL_HAS_MEDIA
-#if CLVOL_HAS_SEGMENTS
+#if CLVOL_LANES
+#include "stages/sample_lanes.h"
+#elif CLVOL_HAS_SEGMENTS
 #include "stages/segment_sample.h"
 #else
 #include "core/sampler.h"

@@ -9,39 +9,17 @@
 #include "stages/boundary.h"
 #include "stages/side.h"
 #endif
-#if CLVOL_HAS_AREA
-#include "geometry/surface.h"
-#endif
 #include "path/key.h"
 #include "path/tally.h"
 #include "path/transitions.h"
-#include "stages/legs.h"
 #include "stages/media.h"
+#include "stages/shadow_ray.h"
 #if CLVOL_HAS_HETEROGENEOUS
 #include CLVOL_TRANSMITTANCE_HEADER
 #endif
 #include "tracking/homogeneous_transmittance.h"
 
 #if CLVOL_HAS_MEDIA
-/* Where the shadow ray's walk begins, at `from`, or goes on, which is said once. */
-INLINE Walked take_shadow_walked(const Scene *scene, uint slot, float from)
-{
-    Walked walked = {path_shadow_leg(scene, slot), from, 0.0f};
-    if (walked.leg > 0) {
-        set_path_shadow_leg(scene, slot, 0);
-        walked.t = path_shadow_walked(scene, slot);
-        walked.rest = path_shadow_walked_rest(scene, slot);
-    }
-    return walked;
-}
-
-INLINE void set_shadow_walked(const Scene *scene, uint slot, Walked walked)
-{
-    set_path_shadow_leg(scene, slot, walked.leg);
-    set_path_shadow_walked(scene, slot, walked.t);
-    set_path_shadow_walked_rest(scene, slot, walked.rest);
-}
-
 INLINE Extinction medium_transmittance(const MediumRay *in, uint4 k, Tally *tally)
 {
 #if CLVOL_HAS_HOMOGENEOUS
@@ -85,38 +63,9 @@ INLINE bool media_transmittance(const Scene *scene, uint slot, SampleKey key, Ra
 }
 #endif
 
-INLINE Ray shadow_ray(const Scene *scene, uint slot)
-{
-    Ray ray;
-    ray.o = CLVOL_HAS_SURFACES ? path_shadow_origin(scene, slot) : path_origin(scene, slot);
-    ray.d = path_shadow_direction(scene, slot);
-    return ray;
-}
-
-#if CLVOL_HAS_SURFACES
-/* The lamp's point that the ray runs to.  A line meets the front of a triangle, disk, sphere or cylinder once, so what
-   it meets there is that point, however t was rounded; a sphere or cylinder that shines outwards hides behind its
-   front.  One that shines inwards may be met from behind first, and so may other triangles of a mesh: they hide the
-   point, unless they are as far as it is, where rounding alone decides which side of an edge the ray passes on. */
-INLINE Target shadow_target(const Scene *scene, uint slot, Ray ray, float reach)
-{
-    Target target = {NO_PRIMITIVE, NO_PRIMITIVE, 0, 0.0f};
-#if CLVOL_HAS_AREA
-    const uint primitive = path_shadow_primitive(scene, slot);
-    if (primitive == NO_PRIMITIVE)
-        return target;
-    __global const Shape *shape = scene->shapes + primitive_shape(scene, primitive);
-    __global const Emitter *lamp = scene->emitters + shape->emitter;
-    const bool met_once = shape->kind == SURFACE_MESH || shape->kind == SURFACE_DISK || !shape->flip;
-    target.primitive = met_once ? primitive : NO_PRIMITIVE;
-    target.first = lamp->primitive;
-    target.count = lamp->count;
-    target.near_ = reach - (largest3(ray.o) + reach) * 0x1p-18f;
-#endif
-    return target;
-}
-#endif
-
+#if CLVOL_LANES
+#include "stages/shadow_lanes.h"
+#else
 #if CLVOL_HAS_PASSABLE
 /* Surfaces that the shadow ray has passed, and the last of them. */
 typedef struct {
@@ -224,18 +173,13 @@ INLINE uint shadow_transmittance(const Scene *scene, uint group, uint slot)
 #if CLVOL_HAS_MEDIA
     record_tally(scene, slot, tally);
 #endif
-    if (tally.stopped) {
-        set_path_shadow_light(scene, slot, path_shadow_light(scene, slot) * share);
-        to_shade(scene, group, slot, EVENT_SHADOW);
-    } else {
-        set_path_radiance(scene, slot, path_radiance(scene, slot) + path_shadow_light(scene, slot) * share);
-        if (path_goes_on(scene, slot))
-            to_intersect(scene, group, slot);
-        else
-            to_generate(scene, group, slot);
-    }
+    if (tally.stopped)
+        shadow_waits(scene, group, slot, share);
+    else
+        shadow_arrives(scene, group, slot, share);
     return steps_of(&tally);
 }
+#endif
 
 #endif
 #endif

@@ -4,6 +4,7 @@
    Woodcock et al. 1965; METHODS §3. */
 #include "tracking/collision.h"
 #include "tracking/flight.h"
+#include "tracking/lanes.h"
 
 INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Tally *tally, Collision *collision)
 {
@@ -21,3 +22,12 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
     }
     return false;
 }
+
+#if CLVOL_LANES
+#define LANE_COLLIDES 1 /* walks end by real collisions */
+
+INLINE Int lane_event(LaneState *state, Real density, Bits k, Int ready)
+{
+    return ready & lane_chooses(k, density, state->bound - density);
+}
+#endif

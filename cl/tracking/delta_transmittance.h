@@ -1,6 +1,7 @@
 /* Transmittance by delta tracking, all or nothing: 1 where no real collision lies in the way, in each
    channel by itself (METHODS §4). */
 #include "tracking/flight.h"
+#include "tracking/lanes.h"
 #include "tracking/transmittance.h"
 
 INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream *stream, Tally *tally)
@@ -27,3 +28,14 @@ INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream
     }
     return transmittance;
 }
+
+#if CLVOL_LANES
+#define LANE_COLLIDES 1 /* walks end by real collisions */
+
+INLINE Int lane_event(LaneState *state, Real density, Bits k, Int ready)
+{
+    const Int real = ready & lane_chooses(k, density, state->bound - density);
+    state->estimate = real ? (Real)(0.0f) : state->estimate;
+    return real;
+}
+#endif

@@ -2,6 +2,7 @@
    tentative collisions (Novák, Selle, Jarosz 2014; METHODS §4).  Factors are not clamped: below a bound
    that is too low they turn negative, and the mean stays right. */
 #include "tracking/flight.h"
+#include "tracking/lanes.h"
 #include "tracking/transmittance.h"
 
 INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream *stream, Tally *tally)
@@ -21,3 +22,18 @@ INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream
     }
     return transmittance;
 }
+
+#if CLVOL_LANES
+#define LANE_COLLIDES 0 /* walks end by roulette */
+
+INLINE Int lane_event(LaneState *state, Real density, Bits k, Int ready)
+{
+    const Real before = state->estimate, after = before * ((state->bound - density) / state->bound);
+    const Real size = after < 0.0f ? -after : after, survivor = (Real)(TRANSMITTANCE_ROULETTE);
+    const Int small = ready & MASK(size < TRANSMITTANCE_ROULETTE);
+    const Int lost = small & ~MASK(lane_uniform(k) * TRANSMITTANCE_ROULETTE < size);
+    const Real kept = small ? (after < 0.0f ? -survivor : survivor) : after;
+    state->estimate = ready ? (lost ? (Real)(0.0f) : kept) : before;
+    return lost;
+}
+#endif

@@ -32,8 +32,9 @@ Examples:
 """
 WATCHED = ("technique", "transmittance")
 CHANNELS = ("red", "green", "blue")
-UNUSED = ("sampler",)
-"""Families that decide nothing inside a medium: walks here have independent numbers of their own."""
+UNUSED = ("sampler", "lanes")
+"""Families that decide nothing inside a medium: walks here have independent numbers of their own, and are
+watched one by one."""
 
 
 @click.command("ray", cls=ExplainedCommand, epilog=EXAMPLES)

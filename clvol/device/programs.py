@@ -93,7 +93,7 @@ def stage_source(plan: Plan, stage: str) -> str:
     if stage == "accumulate":
         return compose(plan, '#include "kernels/accumulate.cl"\n')
     text = f'#include "stages/{stage}.h"\n#include "kernels/stage.cl"\n'
-    return compose(plan, text, stage=layout.stage(stage))
+    return compose(plan, text, {"CLVOL_LANES": plan.lanes.get(stage, 0)}, stage=layout.stage(stage))
 
 
 def light_cache_source(plan: Plan) -> str:

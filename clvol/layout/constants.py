@@ -7,6 +7,8 @@ QUEUE_LENGTHS_STRIDE = 16
 
 NO_JOB = 0xFFFFFFFF
 """Job of a slot that holds no path."""
+NO_SLOT = 0xFFFFFFFF
+"""Slot of a lane that walks for none."""
 NO_PRIMITIVE = 0xFFFFFFFF
 """Primitive of a hit where nothing is hit."""
 

@@ -205,6 +205,8 @@ PATH_STATE: tuple[Declared, ...] = (
     Declared("cut", "u", "statistics of the slot: paths ended by max_depth", ("CLVOL_HAS_MAX_DEPTH",)),
     Declared("cut_energy", "f", "statistics of the slot: weight of those paths", ("CLVOL_HAS_MAX_DEPTH",)),
     Declared("largest_weight", "f", "largest weight of the path or the slot", ("CLVOL_HAS_MEDIA",)),
+    Declared("lane_steps", "u", "statistics of the slot: steps of lanes, idle or not", ("CLVOL_HAS_LANES",)),
+    Declared("busy_lane_steps", "u", "statistics of the slot: of lanes that walked", ("CLVOL_HAS_LANES",)),
     Declared(
         "exhausted", "u", "statistics of the slot: walks ended by a loop's bound", ("CLVOL_HAS_LONG_WALKS",)
     ),
@@ -222,6 +224,8 @@ SLOT_STATISTICS: dict[str, Callable[..., Any]] = {
     "cut": np.sum,
     "cut_energy": np.sum,
     "largest_weight": np.max,
+    "lane_steps": np.sum,
+    "busy_lane_steps": np.sum,
     "exhausted": np.sum,
 }
 """Fields that a slot keeps from path to path, unless a picture shows them, and how those of slots combine."""

@@ -19,6 +19,7 @@ C_TYPES = {"f": "float", "i": "int", "u": "uint"}
 
 _NUMBERS = (
     "NO_JOB",
+    "NO_SLOT",
     "NO_PRIMITIVE",
     "BRICK_CELLS",
     "BRICK_EDGE",

@@ -130,6 +130,7 @@ _FIRST_HIT = "depth normal albedo position met"
 _HIT = "hit_t hit_primitive hit_u hit_v"
 _PASSED = "segment after_t after_primitive"
 _LEG = "leg walked walked_rest"
+_LANES = "lane_steps busy_lane_steps"
 _SHADOW_RAY = "shadow_direction shadow_distance shadow_primitive shadow_origin shadow_inside shadow_light"
 _SHADOW_LEG = (
     "shadow_leg shadow_walked shadow_walked_rest shadow_medium "
@@ -195,9 +196,10 @@ STAGES = (
             _KEY,
             _COUNTS,
             _LEG,
+            _LANES,
             "event channel beta radiance inside segment after_t hit_t medium_end largest_weight exhausted",
         ),
-        writes=_fields(_COUNTS, _LEG, "origin medium beta radiance largest_weight exhausted"),
+        writes=_fields(_COUNTS, _LEG, _LANES, "origin medium beta radiance largest_weight exhausted"),
         needs="CLVOL_HAS_MEDIA",
         stands_by="WALK",
     ),
@@ -254,8 +256,10 @@ STAGES = (
             Transition("INTERSECT", "its shadow ray is through, and it goes on"),
             Transition("GENERATE", "its shadow ray is through, and it has ended"),
         ),
-        reads=_fields(_KEY, _COUNTS, _SHADOW_RAY, _SHADOW_LEG, "origin goes_on channel radiance exhausted"),
-        writes=_fields(_COUNTS, _SHADOW_LEG, "shadow_inside shadow_light radiance exhausted"),
+        reads=_fields(
+            _KEY, _COUNTS, _SHADOW_RAY, _SHADOW_LEG, _LANES, "origin goes_on channel radiance exhausted"
+        ),
+        writes=_fields(_COUNTS, _SHADOW_LEG, _LANES, "shadow_inside shadow_light radiance exhausted"),
         needs="CLVOL_NEE",
         stands_by="SHADOW",
     ),

@@ -16,7 +16,8 @@ DEFAULT_SAMPLER = "joint"
 OWN = "the scene's own"
 """The reason of a name that the scene's integrator gives."""
 UNSETTLED = "auto"
-"""The majorant of a plan until the volumes are prepared, which show what each kind would cost."""
+"""The majorant of a plan until the volumes are prepared, which show what each kind would cost, and its lanes
+until a device is known."""
 
 
 def resolve(
@@ -47,6 +48,7 @@ def resolve(
         "light_choice": ("contribution", "each light as often as it matters at the point"),
         "next_event": ("control", "the noise of a phase function's peak is less"),
         "sampler": (DEFAULT_SAMPLER, _SAMPLERS[DEFAULT_SAMPLER]),
+        "lanes": (UNSETTLED, "16 on processors, off on others"),
     }
     names, reasons = {}, {}
     for family, rule in rules.items():

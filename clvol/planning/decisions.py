@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, cast
 
 from clvol import layout
 from clvol.planning import registry
+from clvol.planning.lanes import lanes
 from clvol.planning.needs import MajorantNeeds
 from clvol.planning.settled import FAR_APART, Settled, Tuning
 
@@ -30,7 +31,7 @@ class Decisions:
     features : what the scene uses.
     choices : what was asked for.
     chosen : a choice of every family; the majorant's stays "auto" until volumes are prepared, and is "none"
-        where no medium is heterogeneous.
+        where no medium is heterogeneous; that of lanes stays "auto" until a device is known.
     reasons : why, by family.
     boundaries : what bounds the media, which tables are made from; not compared.
     settled : what only the volumes show; None before they are prepared.
@@ -181,6 +182,11 @@ class Decisions:
             cast("ResidualControl", self.chosen["control"]) if residual else "none",
             self.choices.majorant_scale,
         )
+
+    @property
+    def lanes(self) -> dict[str, int]:
+        """Stages that walk their paths side by side, and how many at once."""
+        return lanes(self)
 
     @property
     def randomizations(self) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from clvol.planning import registry
+from clvol.planning.lanes import against
 from clvol.planning.names import Names
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ def used_names(plan: Decisions) -> Names:
         "next_event": ("control" if plan.direction_control else "plain")
         if plan.nee and features.scattering
         else "none",
+        "lanes": chosen["lanes"] if "" in against(plan).values() else "none",
     }
     return Names(used)
 
@@ -73,6 +75,7 @@ def reasons(plan: Decisions) -> dict[str, str]:
         "shadow_cache": "no shadow ray passes a heterogeneous medium",
         "light_choice": "there is one light at most to sample",
         "next_event": "no light is sampled in media",
+        "lanes": "; ".join(dict.fromkeys(against(plan).values())) or "no walk goes from look-up to look-up",
     }
     found = {}
     for family, name in used.items():

@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from clvol import layout
-from clvol.planning.auto import OWN, resolve
+from clvol.planning.auto import OWN, UNSETTLED, resolve
 from clvol.planning.choices import Choices
 from clvol.planning.compiled import filled_slots, plan_macros
 from clvol.planning.decisions import Decisions
@@ -82,7 +82,10 @@ class Plan(Decisions):
 
     def tune(self, tuning: Tuning) -> Plan:
         """With what the kind of device decides."""
-        return replace(self, tuning=tuning)
+        chosen = self.chosen
+        if chosen["lanes"] == UNSETTLED:
+            chosen = chosen.but(lanes=str(tuning.lanes or "off"))
+        return replace(self, chosen=chosen, tuning=tuning)
 
     @cached_property
     def in_force(self) -> Names:

@@ -29,6 +29,7 @@ class Choice:
     linear : it uses the density of a look-up once and linearly, so that a stochastic look-up may replace it.
     biased : its pictures are labelled as biased.
     low_discrepancy : a pixel's samples depend on each other, and are dealt to parts that tell their error.
+    in_lanes : walks by it may go side by side, too (clvol.planning.lanes).
     """
 
     summary: str
@@ -41,6 +42,7 @@ class Choice:
     linear: bool = True
     biased: bool = False
     low_discrepancy: bool = False
+    in_lanes: bool = False
 
 
 TECHNIQUES = {
@@ -48,6 +50,7 @@ TECHNIQUES = {
         "Woodcock tracking: exact free flights by rejection against the majorant",
         "tracking/delta.h",
         needs_bound=True,
+        in_lanes=True,
     ),
     "weighted-delta": Choice(
         "delta tracking with weights: right for any majorant", "tracking/weighted.h", weighted=True
@@ -92,8 +95,15 @@ TECHNIQUES = {
     ),
 }
 TRANSMITTANCES = {
-    "delta": Choice("all or nothing, by delta tracking", "tracking/delta_transmittance.h", needs_bound=True),
-    "ratio": Choice("ratio tracking: product of null-collision probabilities", "tracking/ratio.h"),
+    "delta": Choice(
+        "all or nothing, by delta tracking",
+        "tracking/delta_transmittance.h",
+        needs_bound=True,
+        in_lanes=True,
+    ),
+    "ratio": Choice(
+        "ratio tracking: product of null-collision probabilities", "tracking/ratio.h", in_lanes=True
+    ),
     "residual-ratio": Choice(
         "exact transmittance of a control in each majorant cell (--control), ratio tracking of the rest",
         "tracking/residual_ratio.h",
@@ -116,8 +126,8 @@ TRANSMITTANCES = {
     ),
 }
 MAJORANTS = {
-    "global": Choice("one bound for the whole medium", "majorant/global.h"),
-    "grid": Choice("a bound per cell of a uniform grid", "majorant/grid.h"),
+    "global": Choice("one bound for the whole medium", "majorant/global.h", in_lanes=True),
+    "grid": Choice("a bound per cell of a uniform grid", "majorant/grid.h", in_lanes=True),
     "kdtree": Choice("a bound per leaf of an adaptive tree", "majorant/kdtree.h"),
 }
 LOOKUPS = {
@@ -170,6 +180,12 @@ NEXT_EVENTS = {
     "plain": Choice("light times phase function times transmittance"),
     "control": Choice("with a control variate of zero mean, that knows where the path goes on"),
 }
+LANES = {
+    "off": Choice("a work-item walks one path after the other"),
+    "4": Choice("a work-item walks 4 paths side by side"),
+    "8": Choice("a work-item walks 8 paths side by side"),
+    "16": Choice("a work-item walks 16 paths side by side"),
+}
 
 FAMILIES = {
     "technique": TECHNIQUES,
@@ -184,6 +200,7 @@ FAMILIES = {
     "shadow_cache": SHADOW_CACHES,
     "light_choice": LIGHT_CHOICES,
     "next_event": NEXT_EVENTS,
+    "lanes": LANES,
 }
 FAMILY_PURPOSE = {
     "technique": "How collisions are sampled.",
@@ -198,6 +215,7 @@ FAMILY_PURPOSE = {
     "shadow_cache": "Whether shadow rays and lights are chosen by a cache of transmittances.",
     "light_choice": "How next-event estimation picks a light.",
     "next_event": "How next-event estimation in media weighs its light.",
+    "lanes": "How many paths a work-item walks at once.",
 }
 
 FIRST_HIT = {

@@ -46,9 +46,11 @@ class Tuning:
     Parameters
     ----------
     local_size : work-items of a group.  group_slots : path slots of a group.
+    lanes : paths that a work-item walks at once where that is left to the device; 0: one after the other.
     known : a device has been asked; the sizes are a guess before.
     """
 
     local_size: int = 1
     group_slots: int = 256
+    lanes: int = 0
     known: bool = True

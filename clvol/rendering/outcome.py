@@ -152,6 +152,8 @@ def statistics(session: Session, samples: int) -> dict[str, Any]:
         "real_collisions": counts["real"],
         "cells_crossed": counts["cells"],
         "shadow_rays": counts["shadow_rays"],
+        "lane_steps": int(slots.get("lane_steps", 0)),
+        "busy_lane_steps": int(slots.get("busy_lane_steps", 0)),
         "seconds": {
             "setup": session.setup_seconds,
             "kernels": session.kernel_seconds,

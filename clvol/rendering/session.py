@@ -202,7 +202,7 @@ def nothing_finished(urgency: int) -> BaseException:
 
 def on_device(prepared: PreparedScene, device: Device) -> PreparedScene:
     """With its plan tuned for the kind of device."""
-    tuning = Tuning(1, 256) if device.is_cpu else Tuning(128, 1024)
+    tuning = Tuning(1, 256, lanes=16) if device.is_cpu else Tuning(128, 1024)
     return replace(prepared, plan=prepared.plan.tune(tuning))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import pyopencl as cl
 
 from clvol import layout
+from clvol.accel.skipping import marked_empty
 from clvol.layout import BRICK_SAMPLES
 from clvol.rendering.light_cache import light_cache_buffers
 from clvol.scene import records
@@ -25,6 +26,7 @@ from clvol.tables.sobol import block_table
 
 if TYPE_CHECKING:
     from clvol.device.device import Device
+    from clvol.tables.majorants import PreparedMajorant
     from clvol.tables.prepare import PreparedScene
     from clvol.tables.surfaces import Surfaces
 
@@ -45,7 +47,8 @@ def upload_scene(device: Device, prepared: PreparedScene, render: np.ndarray) ->
     tables = (prepared.majorants[number] for number in prepared.matter.of_entry)
     majorants = [table for table in tables if table is not None]
     if "majorants" in needed:
-        buffers["majorants"] = _buffer(device, np.concatenate([m.majorant for m in majorants]))
+        bounds = [_bounds(m) if prepared.plan.lanes else m.majorant for m in majorants]
+        buffers["majorants"] = _buffer(device, np.concatenate(bounds))
     if "majorant_links" in needed:
         buffers["majorant_links"] = _buffer(
             device, np.concatenate([m.links for m in majorants if m.links is not None])
@@ -85,6 +88,11 @@ def upload_scene(device: Device, prepared: PreparedScene, render: np.ndarray) ->
         known = {**buffers, "render": device.memory.upload(render, "the camera")}
         buffers |= light_cache_buffers(device, prepared, known)
     return buffers
+
+
+def _bounds(majorant: PreparedMajorant) -> np.ndarray:
+    """Bounds of a grid's cells as walks in lanes take them."""
+    return marked_empty(majorant.majorant.reshape(majorant.cells[::-1])).reshape(-1)
 
 
 def _surface_arrays(surfaces: Surfaces, lights: LightTable) -> dict[str, np.ndarray]:

@@ -23,6 +23,7 @@ CHOICES = (
     "shadow_cache",
     "light_choice",
     "next_event",
+    "lanes",
 )
 """Parameters handed on as strings; what they may say is for the registry of techniques to judge."""
 

@@ -280,6 +280,7 @@ def test_options_reach_render_unchanged(scene: str, tmp_path: Path, monkeypatch:
         "shadow_cache": "auto",
         "light_choice": "auto",
         "next_event": "auto",
+        "lanes": "auto",
         "majorant_scale": 1.25,
         "step": None,
         "aov": ("cells", "null"),

@@ -39,6 +39,7 @@ CHOICES = {
     "shadow_cache": "off",
     "light_choice": "power",
     "next_event": "plain",
+    "lanes": "8",
 }
 LIMITS = {
     "max_depth": 5,

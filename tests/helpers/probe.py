@@ -1,5 +1,7 @@
 """Runs single device functions: a tiny kernel round them, one work-item per number, on a real scene."""
 
+from types import MappingProxyType
+
 import numpy as np
 
 from clvol import layout
@@ -77,10 +79,10 @@ class Probe(SceneKernels):
         """Write the prepared scene to the device (again)."""
         super().upload(seed)
 
-    def run(self, headers, body, outputs, inputs=(), stage=None):
+    def run(self, headers, body, outputs, inputs=(), stage=None, macros=MappingProxyType({})):
         """Run `body` for `outputs[0].size` work-items with index `i`; arrays are in0, in1, out0, and so on.
 
-        `stage` names the stage whose functions it calls, and whose contract holds.
+        `stage` names the stage whose functions it calls, and whose contract holds; `macros`: more of them.
         """
         inputs = [np.ascontiguousarray(a) for a in inputs]
         names = [(f"in{n}", a) for n, a in enumerate(inputs)] + [
@@ -99,5 +101,5 @@ class Probe(SceneKernels):
         )
         count = outputs[0].shape[0]
         contract = stage and layout.stage(stage)
-        self.run_unit("probe", text, count, inputs, outputs, [np.uint32(count)], stage=contract)
+        self.run_unit("probe", text, count, inputs, outputs, [np.uint32(count)], macros, contract)
         return outputs

@@ -242,22 +242,22 @@ def test_paths_are_moved_by_transitions_alone(device):
 
 
 @pytest.mark.parametrize(
-    ("stage", "old", "new"),
+    ("stage", "file", "old", "new"),
     [
-        ("intersect", "to_medium(", "to_generate("),
-        ("medium_sample", "to_shade(", "to_intersect("),
-        ("intersect", "uint event = EVENT_ESCAPE", "uint event = EVENT_COLLISION"),
-        ("shade", "to_intersect(scene, group, slot);", "set_path_event(scene, slot, EVENT_WALK);"),
-        ("shadow_transmittance", "path_goes_on(", "path_hit_t("),
+        ("intersect", "intersect", "to_medium(", "to_generate("),
+        ("medium_sample", "sample_lanes", "to_shade(", "to_intersect("),
+        ("intersect", "intersect", "uint event = EVENT_ESCAPE", "uint event = EVENT_COLLISION"),
+        ("shade", "shade", "to_intersect(scene, group, slot);", "set_path_event(scene, slot, EVENT_WALK);"),
+        ("shadow_transmittance", "shadow_ray", "path_goes_on(", "path_hit_t("),
     ],
 )
-def test_what_a_contract_does_not_name_does_not_compile(device, monkeypatch, stage, old, new):
+def test_what_a_contract_does_not_name_does_not_compile(device, monkeypatch, stage, file, old, new):
     plan = plan_of(device, "a medium, a channel a path")
     original = programs.kernel_source
 
     def source(name):
         text = original(name)
-        if name != f"stages/{stage}.h":
+        if name != f"stages/{file}.h":
             return text
         assert old in text
         return text.replace(old, new)

@@ -182,7 +182,8 @@ def test_grids_hold_no_analytic_tracking(device):
 def test_one_majorant_is_compiled_and_only_its_buffer_is_bound(device, majorant, buffer):
     plan = plan_of(device, SCENES["a grid"], majorant)
     walks = {f for f in headers(plan) if f.startswith("majorant/")} - {"majorant/majorant.h"}
-    assert walks == {f"majorant/{majorant}.h"} | ({"majorant/box_walk.h"} if majorant == "kdtree" else set())
+    beside = {"kdtree": "majorant/box_walk.h"}.get(majorant, "majorant/lanes.h")
+    assert walks == {f"majorant/{majorant}.h", beside}
     assert not {"geometry/lattice_tree.h", "majorant/tree_grid.h"} & set(headers(plan)), "for sparse grids"
     assert argument_names(plan) & {"majorants", "kd_nodes"} == ({buffer} if buffer else set())
 

@@ -1,0 +1,97 @@
+/* Walks side by side: numbers of CLVOL_LANES walks at once, one in each lane of a vector, or of one walk.
+
+   Where all is one walk the names stand for scalars, so that what is written once computes the same bits at every
+   width.  A mask holds all ones where it holds, else 0, and masks combine by & | ~; a ? b : c takes one.  Only plain
+   operators: PoCL calls its library for the built-in functions of vectors, lane by lane. */
+#ifndef CLVOL_CORE_LANES_H
+#define CLVOL_CORE_LANES_H
+#if CLVOL_LANES
+#include "core/math.h"
+
+#if CLVOL_LANES == 1
+typedef float Real;
+typedef int Int;
+typedef uint Bits;
+#define MASK(condition) (-(int)(condition))
+#define to_int(x) ((int)(x))
+#define to_real(x) ((float)(x))
+#define real_bits(x) as_uint(x)
+#define bits_real(x) as_float(x)
+#define bits_int(x) as_int(x)
+#define int_bits(x) as_uint(x)
+#define gather(p, i) ((p)[i])
+#else
+#define LANES_JOIN_(a, b) a##b
+#define LANES_JOIN(a, b) LANES_JOIN_(a, b)
+typedef LANES_JOIN(float, CLVOL_LANES) Real;
+typedef LANES_JOIN(int, CLVOL_LANES) Int;
+typedef LANES_JOIN(uint, CLVOL_LANES) Bits;
+#define MASK(condition) (condition)
+#ifdef __clang__ /* whose conversion is one instruction for a vector */
+#define to_int(x) __builtin_convertvector(x, Int)
+#define to_real(x) __builtin_convertvector(x, Real)
+#else
+#define to_int(x) LANES_JOIN(LANES_JOIN(convert_int, CLVOL_LANES), _rtz)(x)
+#define to_real(x) LANES_JOIN(convert_float, CLVOL_LANES)(x)
+#endif
+#define real_bits(x) LANES_JOIN(as_uint, CLVOL_LANES)(x)
+#define bits_real(x) LANES_JOIN(as_float, CLVOL_LANES)(x)
+#define bits_int(x) LANES_JOIN(as_int, CLVOL_LANES)(x)
+#define int_bits(x) LANES_JOIN(as_uint, CLVOL_LANES)(x)
+#if CLVOL_LANES == 4
+#define gather(p, i) ((p)[(i).s0], (p)[(i).s1], (p)[(i).s2], (p)[(i).s3])
+#elif CLVOL_LANES == 8
+#define gather(p, i) \
+    ((p)[(i).s0], (p)[(i).s1], (p)[(i).s2], (p)[(i).s3], (p)[(i).s4], (p)[(i).s5], (p)[(i).s6], (p)[(i).s7])
+#else
+#define gather(p, i) \
+    ((p)[(i).s0], (p)[(i).s1], (p)[(i).s2], (p)[(i).s3], (p)[(i).s4], (p)[(i).s5], (p)[(i).s6], (p)[(i).s7], \
+     (p)[(i).s8], (p)[(i).s9], (p)[(i).sa], (p)[(i).sb], (p)[(i).sc], (p)[(i).sd], (p)[(i).se], (p)[(i).sf])
+#endif
+#endif
+
+/* p[i] in every lane, by loads of its own: the gather instructions of processors are slower. */
+#define gather_real(p, i) ((Real)gather(p, i))
+#define gather_int(p, i) ((Int)gather(p, i))
+
+/* NaN-free arguments only. */
+INLINE Real least_of(Real a, Real b) { return a < b ? a : b; }
+INLINE Real greatest_of(Real a, Real b) { return a > b ? a : b; }
+INLINE Int least_int(Int a, Int b) { return a < b ? a : b; }
+INLINE Real between(Real a, Real b, Real t) { return (b - a) * t + a; }
+
+/* The lanes in which a mask holds, a bit each. */
+INLINE uint lanes_of(Int mask)
+{
+#if CLVOL_LANES == 1
+    return (uint)mask & 1u;
+#else
+#if CLVOL_LANES == 16
+    const int16 own = mask & (int16)(1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16384, 32768);
+    const int8 eight = own.lo | own.hi;
+    const int4 four = eight.lo | eight.hi;
+#elif CLVOL_LANES == 8
+    const int8 own = mask & (int8)(1, 2, 4, 8, 16, 32, 64, 128);
+    const int4 four = own.lo | own.hi;
+#else
+    const int4 four = mask & (int4)(1, 2, 4, 8);
+#endif
+    const int2 two = four.lo | four.hi;
+    return (uint)(two.x | two.y);
+#endif
+}
+
+#define ALL_LANES ((1u << CLVOL_LANES) - 1u)
+
+/* How many lanes are among some, and the lowest; as instructions where the compiler has them. */
+#ifdef __clang__
+INLINE uint lane_count(uint lanes) { return (uint)__builtin_popcount(lanes); }
+INLINE uint first_lane(uint lanes) { return (uint)__builtin_ctz(lanes); }
+#else
+INLINE uint lane_count(uint lanes) { return popcount(lanes); }
+INLINE uint first_lane(uint lanes) { return popcount((lanes & -lanes) - 1u); }
+#endif
+
+#endif
+
+#endif

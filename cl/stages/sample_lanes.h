@@ -1,0 +1,61 @@
+/* Walks through the one medium of a scene to a collision, or to the surface or infinity behind it, in lanes
+   (kernels/lanes.cl). */
+#ifndef CLVOL_STAGES_SAMPLE_LANES_H
+#define CLVOL_STAGES_SAMPLE_LANES_H
+#if CLVOL_LANES
+#include "core/sampler.h"
+#include "path/key.h"
+#include "path/ray.h"
+#include "path/tally.h"
+#include "path/transitions.h"
+#include "stages/media.h"
+#include "stages/medium_collision.h"
+#include "tracking/lanes.h"
+
+INLINE bool lane_begin(const Scene *scene, uint group, uint slot, LaneWalk *walk)
+{
+    Ray ray = path_ray(scene, slot);
+    const int channel = (int)path_channel(scene, slot);
+    const Walked walked = walked_so_far(scene, slot, path_after_t(scene, slot));
+#if CLVOL_HAS_SEGMENTS
+    const Inside inside = path_inside(scene, slot);
+    const float to = segment_end(scene, slot, ray);
+    MediumSegment segment = {-1, 0.0f, {0.0f, 0.0f, 0.0f}};
+    if (!next_medium_segment(scene, ray, &inside, walked.t, to, min_of(to, ray_limit(scene, slot, ray)), &segment)) {
+        to_shade(scene, group, slot, path_event(scene, slot));
+        return false;
+    }
+    ray.o = span_point(&segment.span, ray);
+    walk->from = segment.start;
+    walk->in = segment_ray(scene, &inside, 0, ray, segment.span.end - segment.span.start, channel);
+#else
+    walk->from = walked.t;
+    walk->in = rest_of_ray(medium_ray(scene, scene->media, ray, path_medium_end(scene, slot), channel), walked.t);
+#endif
+    const uint number = walk_number(scene, path_segment(scene, slot), 0);
+    walk->k = leg_block(decision_block(scene, path_key(scene, slot), BLOCK_WALK, number), walked.leg);
+    return true;
+}
+
+INLINE void lane_end(const Scene *scene, uint group, const LanePath *path, const LaneArrival *arrival)
+{
+    const uint slot = path->slot;
+    Tally tally = arrival->tally;
+    const Walked walked = take_walked(scene, slot, path->from);
+    const bool stopped = goes_on(walked, &tally);
+    record_tally(scene, slot, tally);
+    uint event = path_event(scene, slot);
+    if (stopped) {
+        set_walked(scene, slot, walk_on(walked, path->from, tally.stop_t));
+        event = EVENT_WALK;
+    } else if (arrival->happened) {
+        set_path_medium(scene, slot, 0);
+        set_path_origin(scene, slot, path->start + arrival->t * path_direction(scene, slot));
+        event = EVENT_COLLISION;
+    }
+    to_shade(scene, group, slot, event);
+}
+
+#endif
+
+#endif
