@@ -1,7 +1,9 @@
 """The figures of docs/performance.md, measured.
 
     python tools/bench.py cloud --mitsuba /path/to/mitsuba-environment/bin/python
-    python tools/bench.py all --json figures.json
+    python tools/bench.py scenes --cycles /path/to/bpy-environment/bin/python --against main~20
+    python tools/bench.py curve film --plot film.svg
+    python tools/bench.py all --minutes 30 --json figures.json
 
 Nothing here is a test: figures depend on the machine and on what else runs on it.  So a figure is a median
 with its least and greatest value, and what is compared takes turns.  The exit status is 1 where an aim is
@@ -12,7 +14,7 @@ docs/performance.md.
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from benchmarks import chromatic
@@ -28,23 +30,29 @@ from benchmarks.costs import (
     show_startup,
     startup_rows,
 )
+from benchmarks.mitsuba_side import cached_mitsuba
 from benchmarks.options import efficiency_options, json_option, mitsuba_option, rounds_option, size_option
 from benchmarks.pool import measure_pool, show_pool
 from benchmarks.rays import EDGE, SIZES, measure_rays, ray_rows, show_rays
 from benchmarks.room import ROOM, measure_room, room_rows, show_room
-from benchmarks.tables import Figures, Row, Unavailable, judge, save
-from folders import SCENES
+from benchmarks.scene_commands import curve, scenes
+from benchmarks.scene_tables import scene_rows
+from benchmarks.scenes import SCENES
+from benchmarks.tables import Figures, Outcome, Row, Unavailable, judge, save
+from folders import SCENES as FOLDER
 from scene_options import choice_options, open_scene
 
 from clvol.cli.messages import OneLineErrors
 
-CLOUD = str(SCENES / "cloud.xml")
+if TYPE_CHECKING:
+    from pathlib import Path
+
+CLOUD = str(FOLDER / "cloud.xml")
 POOL_SIZES = (2048, 8192, 32768)
-Outcome = tuple[Path | None, Figures]
-"""What a command returns: the file to write its figures to, and the figures."""
 ROWS: dict[str, Callable[[Figures], list[Row]]] = {
     "cloud": cloud_rows,
     "room": room_rows,
+    "scenes": scene_rows,
     "rays": ray_rows,
     "startup": startup_rows,
     "load": load_rows,
@@ -55,6 +63,7 @@ ROWS: dict[str, Callable[[Figures], list[Row]]] = {
 ROUGH: dict[str, dict[str, object]] = {
     "cloud": {"res": 16, "seconds": 0.2, "rounds": 2},
     "room": {"res": 16, "seconds": 0.2, "rounds": 2},
+    "scenes": {"res": 16, "seconds": 0.1, "rounds": 2, "shrink": 4},
     "rays": {"triangles": (1000, 3000), "edge": 64, "rounds": 2},
     "startup": {"rounds": 1},
     "load": {"size": 32, "rounds": 1},
@@ -211,6 +220,8 @@ def pool(
 
 
 main.add_command(chromatic.main, "chromatic")
+main.add_command(scenes)
+main.add_command(curve)
 
 
 def rough_option(command: Callable) -> Callable:
@@ -219,23 +230,50 @@ def rough_option(command: Callable) -> Callable:
     return click.option("--rough", is_flag=True, help=text)(command)
 
 
+def all_options(command: Callable) -> Callable:
+    """Options of all measurements together."""
+    minutes = click.option(
+        "--minutes", type=float, help="Of what takes turns, together; as long as each does itself by default."
+    )
+    cycles = click.option("--cycles", metavar="PYTHON", help="A Python that has bpy 5, Blender's module.")
+    against = click.option("--against", metavar="REV", help="Compare with clvol as it was at this commit.")
+    return mitsuba_option(cycles(against(minutes(rough_option(command)))))
+
+
+def turn_seconds(minutes: float, sides: int) -> float:
+    """Length of a turn where all turns together, of five rounds each, take so long."""
+    turns = 5 * (2 + 2 + sides * len(SCENES))
+    return 60 * minutes / turns
+
+
 @main.command("all")
-@mitsuba_option
-@rough_option
+@all_options
 @json_option
 @click.pass_context
-def everything(context: click.Context, mitsuba: str | None, rough: bool, json_path: Path | None) -> Outcome:
-    """Every figure, one after the other, with the defaults of each command: five to ten minutes.
+def everything(
+    context: click.Context,
+    mitsuba: str | None,
+    cycles: str | None,
+    against: str | None,
+    minutes: float | None,
+    rough: bool,
+    json_path: Path | None,
+) -> Outcome:
+    """Every figure but the curves, one after the other: a quarter of an hour, or as long as you say.
 
     What there is nothing to compare with on this machine is left out, and said at the end.
     """
     figures: Figures = {}
     left_out: dict[str, str] = {}
-    for command in (cloud, room, rays, startup, load, memory, chromatic.main, pool):
+    for command in (cloud, room, scenes, rays, startup, load, memory, chromatic.main, pool):
         name = "chromatic" if command is chromatic.main else command.name
         arguments = dict(ROUGH[name]) if rough else {}
-        if command in (cloud, room):
+        if command in (cloud, room, scenes):
             arguments["mitsuba"] = mitsuba
+            if minutes and not rough:
+                arguments["seconds"] = turn_seconds(minutes, 2 + bool(cycles) + bool(against))
+        if command is scenes:
+            arguments |= {"cycles": cycles, "against": against, "mitsuba": mitsuba or cached_mitsuba()}
         try:
             figures |= context.invoke(command, **arguments)[1]
         except Unavailable as error:

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 import bench
 import click
 from benchmarks.options import mitsuba_option
+from benchmarks.scene_tables import overview
 from benchmarks.tables import judge
 from docs_tables import ROOT, performance_part, pilot_page, techniques_page, transitions_part
 from documents import between, writable, write
@@ -31,10 +32,11 @@ if TYPE_CHECKING:
 
 DOCS = ROOT / "docs"
 PERFORMANCE, ARCHITECTURE = DOCS / "performance.md", DOCS / "architecture.md"
-COMMAND_LINE = DOCS / "command-line.md"
+COMMAND_LINE, README = DOCS / "command-line.md", ROOT / "README.md"
 PICTURED = ("gallery.md", "ray.md")
 """Pages whose commands make their pictures."""
 FIRST, LAST = "<!-- performance: written by tools/docs.py -->", "<!-- end of performance -->"
+IN_README = "<!-- speed: written by tools/docs.py -->", "<!-- end of speed -->"
 PROFILE = "<!-- profile: written by tools/docs.py -->", "<!-- end of profile -->"
 TRANSITIONS = "<!-- transitions: written by tools/docs.py -->", "<!-- end of transitions -->"
 
@@ -131,22 +133,44 @@ def pilot(spp: int, rounds: int, more: int, scenes: tuple[str, ...], device: str
 
 
 @main.command()
-@mitsuba_option
-@bench.rough_option
+@bench.all_options
 @output_option(PERFORMANCE)
+@click.option(
+    "--readme",
+    default=README,
+    type=click.Path(path_type=Path),
+    callback=writable,
+    metavar="FILE",
+    help="Where the six scenes go in short.",
+)
 @click.pass_context
-def performance(context: click.Context, mitsuba: str | None, rough: bool, output: Path) -> int:
-    """The table of performance.md, between its markers, from all of tools/bench.py.
+def performance(
+    context: click.Context,
+    mitsuba: str | None,
+    cycles: str | None,
+    against: str | None,
+    minutes: float | None,
+    rough: bool,
+    output: Path,
+    readme: Path,
+) -> int:
+    """The tables of performance.md and of the README, between their markers, from all of tools/bench.py.
 
     What cannot be measured on a machine, for want of Mitsuba or embreex, is left out of the table, and said
     there and at the end. The exit status is 1 where anything is left out or an aim is missed.
     """
-    if rough and output == PERFORMANCE:
-        raise click.UsageError("rough figures are not for the documentation: give --output")
+    if rough and (output == PERFORMANCE or readme == README):
+        raise click.UsageError("rough figures are not for the documentation: give --output and --readme")
     enclosed(output)  # told now, not after the measurements
-    _, figures = context.invoke(bench.everything, mitsuba=mitsuba, rough=rough)
+    between(readme.read_text(encoding="utf-8"), *IN_README, readme.name)
+    _, figures = context.invoke(
+        bench.everything, mitsuba=mitsuba, cycles=cycles, against=against, minutes=minutes, rough=rough
+    )
     before, after = enclosed(output)  # as it is by now
     write(output, f"{before}\n{performance_part(figures)}\n{after}")
+    if "scenes" in figures:
+        before, after = between(readme.read_text(encoding="utf-8"), *IN_README, readme.name)
+        write(readme, "\n".join([before, "", *overview(figures["scenes"]), "", after]))
     return max(judge(bench.rows(figures)), bench.say_left_out(figures))
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import bench
 import click
+from benchmarks.scene_tables import details
 from benchmarks.tables import Figures as Measured
 from benchmarks.tables import markdown, thread_count
 from folders import ROOT
@@ -208,10 +209,16 @@ def transitions_part() -> str:
 def performance_part(figures: Measured) -> str:
     """What stands between the markers: the table, on what it was measured, and what could not be."""
     lines = ["", *markdown(bench.rows(figures)), ""]
+    if "scenes" in figures:
+        lines += ["What each side took and counted on the scenes, per sample:", ""]
+        lines += [*details(figures["scenes"]), ""]
     left_out = figures.get(bench.LEFT_OUT, {})
     beside = [figures[n]["mitsuba"]["version"] for n in ("cloud", "room") if n in figures]
     theirs = f"; Mitsuba {beside[0]} on as many threads" if beside else ""
     lines.append(f"{machine()}{theirs}. What is compared took turns; medians, and the range over the rounds.")
+    if "scenes" in figures:
+        million = figures["scenes"]["bare_loop"] / 1e6
+        lines.append(f"The bare loop made {million:.0f} million steps a CPU second.")
     for name, reason in left_out.items():
         lines.append(f"Not measured: `{name}`, {reason}.")
     return "\n".join([*lines, ""])

@@ -81,7 +81,7 @@ def measure_cloud(
     figures: Figures = {name: _side_figures(side) for name, side in sides.items()}
     figures["clvol"] |= {"version": __version__, "setup_cpu": setup_cpu}
     figures["clvol"]["variance_by_pixel"] = float(np.mean(own_variance))
-    figures["mitsuba"] |= {"version": mitsuba.version, "setup_cpu": mitsuba.setup_cpu}
+    figures["mitsuba"] |= {"version": mitsuba.version, "setup_cpu": mitsuba.load_cpu}
     means = [(figures[name]["mean"], figures[name]["standard_error"]) for name in sides]
     return figures | {
         "scene": Path(scene).name,

@@ -10,6 +10,8 @@ from documents import writable
 from scene_options import choice_options
 
 from benchmarks import cloud
+from benchmarks.scenes import SCENES
+from benchmarks.tables import thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -54,6 +56,35 @@ mitsuba_option = click.option(
 )
 
 
+res_option = click.option("--res", type=click.IntRange(min=1), default=128, show_default=True)
+seconds_option = click.option(
+    "--seconds", type=float, default=3.0, show_default=True, help="Length of a side's turn."
+)
+threads_option = click.option(
+    "--threads", type=click.IntRange(min=1), default=thread_count, help="Of every side; all cores by default."
+)
+bench_scene_option = click.option(
+    "--scene", type=click.Choice(list(SCENES)), default="cloud", show_default=True
+)
+
+
+def peer_options(command: Callable) -> Callable:
+    """Who takes part beside clvol: --mitsuba, --cycles, --against."""
+    for option in (
+        click.option("--against", metavar="REV", help="clvol as it was at a commit of this repository."),
+        click.option("--cycles", metavar="PYTHON", help="A Python that has bpy 5, Blender's module."),
+        click.option("--mitsuba", metavar="PYTHON", help="A Python that has Mitsuba 3.9."),
+    ):
+        command = option(command)
+    return command
+
+
+def asked(choices: dict[str, str], device: str | None) -> dict[str, str]:
+    """Options of `clvol.render` that were given: an old commit knows no others."""
+    given = {family: name for family, name in choices.items() if name != "auto"}
+    return given | ({"device": device} if device else {})
+
+
 def efficiency_options(scene: str) -> Callable:
     """The options of a comparison with Mitsuba."""
 
@@ -61,11 +92,9 @@ def efficiency_options(scene: str) -> Callable:
         for option in (
             json_option,
             choice_options,
-            click.option(
-                "--seconds", type=float, default=3.0, show_default=True, help="Length of a side's turn."
-            ),
+            seconds_option,
             rounds_option(5),
-            click.option("--res", type=click.IntRange(min=1), default=128, show_default=True),
+            res_option,
             click.option("--scene", default=scene, metavar="SCENE", help="A scene that has $res."),
             mitsuba_option,
         ):

@@ -6,6 +6,8 @@ attenuated differently, a closed room, a large grid that is nearly empty, and em
 
 from __future__ import annotations
 
+import dataclasses
+import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree as Xml
@@ -162,6 +164,8 @@ SCENES = {
 def write_scene(scene: BenchScene, folder: Path, size: int | None = None) -> Path:
     """The scene as scene.xml in a folder, with its volumes beside it; its film's edge is $res.
 
+    scene.json beside it describes the same to programs that do not read Mitsuba's scenes.
+
     size : voxels along an axis, where it is not the scene's own.
     """
     size = size or scene.size
@@ -174,6 +178,8 @@ def write_scene(scene: BenchScene, folder: Path, size: int | None = None) -> Pat
         colour = np.asarray(scene.emission.radiance, np.float32)
         glow = volume(scene.emission.volume, size)
         write_vol(folder / "emission.vol", glow[..., None] * colour, UNIT)
+    described = dataclasses.asdict(scene)
+    (folder / "scene.json").write_text(json.dumps(described, indent=1), encoding="utf-8")
     path = folder / "scene.xml"
     root = _root(scene)
     _add_lights(root, scene)

@@ -6,6 +6,7 @@ import json
 import os
 import platform
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -17,9 +18,10 @@ from clvol.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-    from pathlib import Path
 
 Figures = dict[str, Any]
+Outcome = tuple[Path | None, Figures]
+"""What a command returns: the file to write its figures to, and the figures."""
 NO_AIM = "–"
 
 

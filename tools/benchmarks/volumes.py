@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from benchmarks.big_grids import cloud_slabs
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -80,7 +82,18 @@ def glow(size: int = 128, seed: int = 2) -> np.ndarray:
     return bordered(light / light.max())
 
 
-VOLUMES: dict[str, Callable[[int], np.ndarray]] = {"cloud": cloud, "thin": thin, "flame": flame, "glow": glow}
+def rough(size: int, seed: int = 1) -> np.ndarray:
+    """A rough cloud of any size, made slab by slab."""
+    return bordered(np.concatenate(list(cloud_slabs(size, seed))))
+
+
+VOLUMES: dict[str, Callable[[int], np.ndarray]] = {
+    "cloud": cloud,
+    "thin": thin,
+    "flame": flame,
+    "glow": glow,
+    "rough": rough,
+}
 
 
 def volume(name: str, size: int) -> np.ndarray:
