@@ -25,20 +25,24 @@ def main() -> None:
         if device is None:
             device = cl.get_platforms()[job["platform"]].get_devices()[job["device"]]
             queue = cl.CommandQueue(cl.Context([device]))
-        build(queue, **job["kernel"])
+        build(queue, **job["unit"])
         print("done", flush=True)
 
 
-def build(queue: cl.CommandQueue, source: str, options: list[str], name: str, size: int, group: int) -> None:
-    """Build a program, and launch its kernel over zeros: with its first launch it is compiled to the end.
+def build(
+    queue: cl.CommandQueue, source: str, options: list[str], launches: list[tuple[str, int, int]]
+) -> None:
+    """Build a program, and launch its kernels over zeros: with its first launch one is compiled to the end.
 
     PoCL compiles for the size of a group, and once for small numbers of them and once for others.
     """
-    kernel = cl.Kernel(cl.Program(queue.context, source).build(options=options), name)
+    program = cl.Program(queue.context, source).build(options=list(options))
     arguments: list[Any] = [_zeros(queue.context), np.uint32(0)]
-    for number in range(kernel.num_args):
-        _set_either(kernel, number, arguments)
-    cl.enqueue_nd_range_kernel(queue, kernel, (min(size, _MOST),), (group,)).wait()
+    for name, size, group in launches:
+        kernel = cl.Kernel(program, name)
+        for number in range(kernel.num_args):
+            _set_either(kernel, number, arguments)
+        cl.enqueue_nd_range_kernel(queue, kernel, (min(size, _MOST),), (group,)).wait()
 
 
 def _zeros(context: cl.Context) -> cl.Buffer:

@@ -7,12 +7,16 @@ import shutil
 import subprocess
 from dataclasses import dataclass, field
 from functools import cache, cached_property
+from typing import TYPE_CHECKING
 
 import pyopencl as cl
 
 from clvol.device import kernel_cache
 from clvol.device.memory import DeviceMemory
 from clvol.errors import DeviceError, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 _KINDS = ("GPU", "ACCELERATOR", "CPU")
 _POCL = "Portable Computing Language"
@@ -46,6 +50,8 @@ class Device:
     queue: cl.CommandQueue
     programs: dict[str, cl.Program] = field(default_factory=dict)
     """Built programs by source: a second render with the same features and choices builds nothing."""
+    building: dict[str, Callable[[], None]] = field(default_factory=dict)
+    """Sources that other processes build (clvol.device.side_builds), and how to wait for each."""
 
     @cached_property
     def is_cpu(self) -> bool:

@@ -18,14 +18,13 @@ import pyopencl as cl
 from clvol import layout
 from clvol.device.launch import GROUP, whole
 from clvol.device.preprocess import Preprocessor
-from clvol.device.side_builds import Unit
+from clvol.device.side_builds import Launch, Unit
 from clvol.errors import DeviceError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from clvol.device.device import Device
-    from clvol.device.side_builds import SideBuilds
     from clvol.layout.stages import Stage
     from clvol.planning.plan import Plan
 
@@ -108,6 +107,8 @@ def build(device: Device, source: str, name: str) -> cl.Program:
     """
     if source in device.programs:
         return device.programs[source]
+    if source in device.building:
+        device.building[source]()
     program = cl.Program(device.context, source)
     try:
         device.programs[source] = program.build(options=list(BUILD_OPTIONS))
@@ -121,20 +122,16 @@ def build(device: Device, source: str, name: str) -> cl.Program:
 def stage_units(plan: Plan, groups: int, pixels: int) -> dict[str, Unit]:
     """What is built for a plan: each stage, and `accumulate`, for so many groups and pixels."""
     local = plan.tuning.local_size
-    launches = dict.fromkeys(plan.stages, (groups * local, local)) | {"accumulate": (whole(pixels), GROUP)}
+    sizes = dict.fromkeys(plan.stages, (groups * local, local)) | {"accumulate": (whole(pixels), GROUP)}
     return {
-        name: Unit(stage_source(plan, name), BUILD_OPTIONS, f"{name}_kernel", *launch)
-        for name, launch in launches.items()
+        name: Unit(stage_source(plan, name), BUILD_OPTIONS, (Launch(f"{name}_kernel", *size),))
+        for name, size in sizes.items()
     }
 
 
-def build_stages(
-    device: Device, units: Mapping[str, Unit], builds: SideBuilds | None = None
-) -> dict[str, cl.Kernel]:
-    """One kernel object per unit, each once `builds` is through with it."""
-    kernels = {}
-    for name, unit in units.items():
-        if builds:
-            builds.wait(unit)
-        kernels[name] = cl.Kernel(build(device, unit.source, name), unit.name)
-    return kernels
+def build_stages(device: Device, units: Mapping[str, Unit]) -> dict[str, cl.Kernel]:
+    """One kernel object per unit."""
+    return {
+        name: cl.Kernel(build(device, unit.source, name), unit.launches[0].name)
+        for name, unit in units.items()
+    }

@@ -1,8 +1,8 @@
-"""Kernels of PoCL are built side by side, in processes of their own.
+"""Kernels of PoCL are built side by side, in this process and others.
 
 PoCL builds one kernel at a time in a process, in however many threads and contexts it is asked.  What it
 builds lies in its cache, and another process that asks for the same finds it there.  Nothing depends on the
-workers but time: what they did not build, this process builds, and says what is wrong with it.
+workers but time: what they did not build is built when it is needed, and then said what is wrong with it.
 """
 
 from __future__ import annotations
@@ -14,10 +14,12 @@ import subprocess
 import sys
 import threading
 from collections import deque
+from contextlib import suppress
 from dataclasses import asdict, dataclass
+from functools import partial
 from hashlib import blake2b
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import pyopencl as cl
 
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("clvol")
 VARIABLE = "CLVOL_BUILD_PROCESSES"
-"""Environment variable: the most processes that build kernels; below 2 none but this one does."""
+"""Environment variable: the most processes that build kernels, this one among them."""
 WORTH_IT = 3
 """Kernels that are missing from which on processes are started: each takes a third of a second to do so."""
 INDEX = "clvol-built"
@@ -41,46 +43,52 @@ _SMALL = 0xFFFF
 """Work-items from which on PoCL compiles a kernel anew, for large numbers of them."""
 
 
-@dataclass(frozen=True)
-class Unit:
-    """A kernel, and the launch that it is built for.
+class Launch(NamedTuple):
+    """A launch that a kernel is built for: its name, and work-items in all and of a group."""
 
-    source, options : its program.  name : of the kernel.  size, group : work-items in all and of a group.
-    """
-
-    source: str
-    options: tuple[str, ...]
     name: str
     size: int
     group: int
 
+
+@dataclass(frozen=True)
+class Unit:
+    """A program with its options, and what is launched of it."""
+
+    source: str
+    options: tuple[str, ...]
+    launches: tuple[Launch, ...]
+
     def key(self, driver: str) -> str:
         """Names what `driver` builds of it."""
-        parts = [driver, *self.options, self.name, str(self.group), str(self.size < _SMALL), self.source]
+        launches = [f"{launch.name} {launch.group} {launch.size < _SMALL}" for launch in self.launches]
+        parts = [driver, *self.options, *launches, self.source]
         return blake2b("\n".join(parts).encode(), digest_size=12).hexdigest()
 
 
 class SideBuilds:
     """Processes that build those of `units` that PoCL's cache lacks, as long as the block runs.
 
-    There are none where the cache has them all, on other devices, and where there is but one core.
+    This process builds as well whenever it waits for one.  There are no others where the cache has all
+    units, on other devices, and where there is but one core.
     """
 
     def __init__(self, device: Device, units: Iterable[Unit]) -> None:
-        self._index = _index(device)
+        self._device, self._index = device, _index(device)
         new = [unit for unit in units if unit.source not in device.programs] if self._index else []
         driver = f"{device.description} {device.queue.device.driver_version}"
         known = _known(self._index) if new else set()
         self._missing = {unit: key for unit in new if (key := unit.key(driver)) not in known}
         self._jobs = deque(sorted(self._missing, key=lambda unit: -len(unit.source)))
-        self._built: dict[Unit, threading.Event] = {}
+        self._built: dict[str, threading.Event] = {}
         self._threads: list[threading.Thread] = []
         self.processes: list[subprocess.Popen[str]] = []
-        count = min(len(self._missing), _most(device))
-        if len(self._missing) >= WORTH_IT and count > 1:
-            self._built = {unit: threading.Event() for unit in self._missing}
+        others = min(len(self._missing), _most(device)) - 1
+        if len(self._missing) >= WORTH_IT and others > 0:
+            self._built = {unit.source: threading.Event() for unit in self._missing}
+            device.building.update({source: partial(self.wait, source) for source in self._built})
             try:
-                self._start(device, count)
+                self._start(device, others)
             except BaseException:
                 self.__exit__()
                 raise
@@ -91,6 +99,8 @@ class SideBuilds:
     def __exit__(self, *_: object) -> None:
         """Leave no process behind, whatever happened."""
         self._jobs.clear()
+        for source in self._built:
+            self._device.building.pop(source, None)
         for process in self.processes:
             process.kill()
         for process in self.processes:
@@ -98,11 +108,22 @@ class SideBuilds:
         for thread in self._threads:
             thread.join()
 
-    def wait(self, unit: Unit) -> None:
-        """Return once a process has built a unit or given up on it, at once where none is to."""
-        built = self._built.get(unit)
-        while built and not built.wait(_GLANCE) and any(thread.is_alive() for thread in self._threads):
+    def wait(self, source: str) -> None:
+        """Return once a program is built or given up.  Until then this process builds what is left."""
+        built = self._built[source]
+        while not built.is_set() and (unit := self._next()):
+            with suppress(cl.Error):  # said when the program is needed
+                build_worker.build(self._device.queue, **asdict(unit))
+            self._built[unit.source].set()
+        while not built.wait(_GLANCE) and any(thread.is_alive() for thread in self._threads):
             pass
+
+    def _next(self) -> Unit | None:
+        """The largest unit that nobody has begun."""
+        try:
+            return self._jobs.popleft()
+        except IndexError:
+            return None
 
     def remember(self) -> None:
         """Note that PoCL's cache has all units."""
@@ -136,15 +157,11 @@ class SideBuilds:
 
     def _serve(self, process: subprocess.Popen[str], place: dict[str, int]) -> None:
         """Hand a process one unit after the other, until it ends."""
-        while True:
-            try:
-                unit = self._jobs.popleft()
-            except IndexError:
-                return
-            done = _ask(process, place | {"kernel": asdict(unit)})
-            self._built[unit].set()
+        while unit := self._next():
+            done = _ask(process, place | {"unit": asdict(unit)})
+            self._built[unit.source].set()
             if not done:
-                log.debug("a process that builds kernels ended at %s", unit.name)
+                log.debug("a process that builds kernels ended at %s", unit.launches)
                 return
 
 
@@ -174,7 +191,7 @@ def _known(index: Path | None) -> set[str]:
 
 
 def _most(device: Device) -> int:
-    """How many processes may build: one per thread of the device, where this Python can start another."""
+    """How many processes may build: one for each thread of the device, where this Python can start more."""
     given = os.environ.get(VARIABLE, "")
     most = int(given) if given.isdecimal() else device.info.compute_units
     return most if "python" in Path(sys.executable or "").name.lower() else 0

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pyopencl as cl
 
-from clvol.device.launch import run_kernel, scene_arguments
-from clvol.device.programs import build, light_cache_source
+from clvol.device.launch import GROUP, run_kernel, scene_arguments, whole
+from clvol.device.programs import BUILD_OPTIONS, build, light_cache_source
+from clvol.device.side_builds import Launch, Unit
 from clvol.tables.light_cache import light_cache_record, rows, typical_radiance
 
 if TYPE_CHECKING:
@@ -18,6 +19,14 @@ if TYPE_CHECKING:
     from clvol.tables.prepare import PreparedScene
 
 _PURPOSE = "the cache of lights", "choose shadow_cache off"
+
+
+def light_cache_unit(prepared: PreparedScene) -> Unit:
+    """What is built for it."""
+    cells = int(np.prod(light_cache_record(prepared)["size"]))
+    sizes = {"light_cache_extinction": cells, "light_cache_transmittance": cells * rows(prepared)}
+    launches = tuple(Launch(name, whole(size), GROUP) for name, size in sizes.items())
+    return Unit(light_cache_source(prepared.plan), BUILD_OPTIONS, launches)
 
 
 def light_cache_buffers(

@@ -19,6 +19,7 @@ from clvol.picture.result import relative_noise
 from clvol.planning.in_force import warnings
 from clvol.planning.plan import Plan
 from clvol.planning.settled import Tuning
+from clvol.rendering.light_cache import light_cache_unit
 from clvol.rendering.profiler import Profiler, timed
 from clvol.rendering.upload import upload_scene
 from clvol.rendering.wavefront import Pool, Progressed, Wavefront
@@ -107,13 +108,14 @@ class Session:
         groups, pixels = slots.slots // plan.tuning.group_slots, int(np.prod(record["film_size"]))
         with timed(profiler, "units"):
             units = stage_units(plan, groups, pixels)
-        with SideBuilds(device, units.values()) as builds:
+            others = [light_cache_unit(prepared)] if plan.light_cache else []
+        with SideBuilds(device, [*units.values(), *others]) as builds:
             uploading = time.perf_counter()
             with timed(profiler, "upload"):
                 buffers = upload_scene(device, prepared, record)
             uploaded = time.perf_counter()
             with timed(profiler, "kernels"):
-                kernels = build_stages(device, units, builds)
+                kernels = build_stages(device, units)
             built = time.perf_counter()
             with timed(profiler, "pool"):
                 wavefront = Wavefront(device, plan, kernels, buffers, record, slots, profiler)
