@@ -10,19 +10,11 @@
 #include "emitter/irradiance.h"
 #include "geometry/span.h"
 
-/* The grid's bounds. */
-typedef struct {
-    float3 lower, upper;
-} CacheBox;
-
-INLINE CacheBox cache_box(const Scene *scene)
+INLINE bool cache_holds(const Scene *scene, float3 p)
 {
-    __global const LightCache *cache = scene->light_cache;
-    const float3 size = (float3)((float)cache->size[0], (float)cache->size[1], (float)cache->size[2]);
-    CacheBox box;
-    box.lower = load_vector(cache->lower);
-    box.upper = box.lower + size / cache->cells_per_length;
-    return box;
+    __global const float *lower = scene->light_cache->lower, *upper = scene->light_cache->upper;
+    return p.x >= lower[0] && p.y >= lower[1] && p.z >= lower[2] && p.x <= upper[0] && p.y <= upper[1] &&
+           p.z <= upper[2];
 }
 
 /* Value at p, within the grid, of a table with a number for the middle of every cell. */
@@ -66,15 +58,16 @@ INLINE float cached_transmittance(const Scene *scene, uint light, float3 p, floa
     const int row = weighed_row(scene, light);
     if (row < 0)
         return 1.0f;
-    const CacheBox box = cache_box(scene);
-    float from = 0.0f, to = distance;
-    Ray ray;
-    ray.o = p;
-    ray.d = d;
-    clip_box(ray, box.lower, box.upper, &from, &to);
-    if (!(from < to))
-        return 1.0f;
-    p += from * d;
+    if (!cache_holds(scene, p)) {
+        float from = 0.0f, to = distance;
+        Ray ray;
+        ray.o = p;
+        ray.d = d;
+        clip_box(ray, load_vector(scene->light_cache->lower), load_vector(scene->light_cache->upper), &from, &to);
+        if (!(from < to))
+            return 1.0f;
+        p += from * d;
+    }
     if ((CLVOL_HAS_CONSTANT || CLVOL_HAS_ENVMAP) && is_environment(scene->emitters + light))
         return cached_sky(scene, p, d);
     return cached_row(scene, (uint)row, p);

@@ -72,12 +72,11 @@ __kernel void light_cache_extinction(CLVOL_ARGUMENTS, __global float *extinction
 INLINE float coarse_depth(const Scene *scene, __global const float *extinction, float3 p, float3 d, float length)
 {
     const float step = 1.0f / (CELL_STEPS * scene->light_cache->cells_per_length);
-    const CacheBox box = cache_box(scene);
     float depth = 0.0f;
     for (uint n = 0; n < 4096u; ++n) {
         const float t = ((float)n + 0.5f) * step;
         const float3 at = p + t * d;
-        if (t > length || any(at < box.lower) || any(at > box.upper))
+        if (t > length || !cache_holds(scene, at))
             break;
         depth += step * cache_interpolate(scene, extinction, at);
     }

@@ -38,18 +38,20 @@ INLINE bool survives_roulette(uint k, float weight, Spectrum *beta)
 }
 
 #if CLVOL_LIGHT_CACHE
-/* Share of what is typical below which a shadow ray may be left out; and the least transmittance that it is expected to
-   have, so that what it brings is bounded where the cache is wrong. */
-#define WORTH_TRACING 0.25f
+/* Shares of what is typical below which a shadow ray may be left out, from media and from surfaces, whose paths are less
+   noisy; and the least transmittance that it is expected to have, so that what it brings is bounded where the cache is
+   wrong. */
+#define WORTH_TRACING_IN_MEDIA 0.2f
+#define WORTH_TRACING_AT_SURFACES 0.02f
 #define LEAST_EXPECTED 0.01f
 
 /* Roulette of a shadow ray by what it will bring, as the cache of lights has it: the more it falls short of what is
    typical, the rarer it is traced.  `transmittance`: the cached one.  Its lower bound keeps what a ray brings bounded where
    the cache is wrong. */
-INLINE bool traces_shadow_ray(const Scene *scene, uint k, float transmittance, Spectrum *value)
+INLINE bool traces_shadow_ray(const Scene *scene, uint k, float worth, float transmittance, Spectrum *value)
 {
     const float expected = spectrum_max(*value) * max_of(transmittance, LEAST_EXPECTED);
-    const float enough = WORTH_TRACING * scene->light_cache->typical;
+    const float enough = worth * scene->light_cache->typical;
     if (!(expected < enough))
         return true;
     if (!(uniform_float(k) * enough < expected))

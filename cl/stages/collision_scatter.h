@@ -89,7 +89,7 @@ INLINE bool next_event(const Scene *scene, uint slot, SampleKey key, __global co
         set_path_radiance(scene, slot, path_radiance(scene, slot) + added);
     }
 #endif
-    if (!traces_shadow_ray(scene, k.w, transmittance, &value))
+    if (!traces_shadow_ray(scene, k.w, WORTH_TRACING_IN_MEDIA, transmittance, &value))
         return false;
 #endif
     set_path_shadow_inside(scene, slot, path_inside(scene, slot));

@@ -23,8 +23,9 @@ INLINE float direction_control(const Scene *scene, __global const Medium *medium
                                float3 wi, float3 to_light)
 {
     const float g = mean_cosine(scene, medium);
-    const float tau = -log(clamp_to(transmittance, 1e-9f, 1.0f));
-    float sum = 0.0f, lobe = g, order = transmittance;
+    float order = clamp_to(transmittance, 1e-9f, 1.0f); /* a number whatever the cache holds */
+    const float tau = -log(order);
+    float sum = 0.0f, lobe = g;
     for (int m = 1; m <= CONTROL_ORDERS; ++m, lobe *= g) {
         order *= tau / (float)m;
         sum += order * (phase_convolved(scene, medium, lobe, wo, to_light) - hg_value(lobe, wi, to_light));

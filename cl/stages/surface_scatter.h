@@ -84,7 +84,7 @@ INLINE bool surface_next_event(const Scene *scene, uint slot, SampleKey key, con
         return false;
 #if CLVOL_LIGHT_CACHE
     const float through = cached_transmittance(scene, light.number, surface->p, light.direction, light.distance);
-    if (!traces_shadow_ray(scene, k.w, through, &value))
+    if (!traces_shadow_ray(scene, k.w, WORTH_TRACING_AT_SURFACES, through, &value))
         return false;
 #endif
     Inside inside = path_inside(scene, slot);

@@ -85,7 +85,8 @@ EMITTER = _record(
 )
 
 LIGHT_CACHE = _record(
-    ("lower", "f", 3),  # corner of the grid
+    ("lower", "f", 3),  # corners of the grid
+    ("upper", "f", 3),
     ("cells_per_length", "f", 1),
     ("size", "i", 3),  # cells per axis
     ("typical", "f", 1),  # radiance that half of the singly scattered light does not exceed

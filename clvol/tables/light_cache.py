@@ -27,10 +27,11 @@ SKY_DIRECTIONS = 6
 def light_cache_record(prepared: PreparedScene) -> np.ndarray:
     """The LIGHT_CACHE record, without what is typical: cubic cells over all heterogeneous media."""
     lower, upper = heterogeneous_bounds(prepared)
-    longest = float((upper - lower).max())
+    longest = float((upper - lower).max()) or 1.0  # media that their volumes miss
     record = np.zeros(1, layout.LIGHT_CACHE)
     record["lower"], record["cells_per_length"] = lower - prepared.centre, EDGE / longest
     record["size"] = np.clip(np.ceil((upper - lower) / longest * EDGE - 1e-3), 1, EDGE)
+    record["upper"] = record["lower"] + record["size"] * np.float32(longest / EDGE)
     return record
 
 

@@ -121,3 +121,19 @@ def test_many_scatterings_have_the_mean_of_a_plain_render(monkeypatch, name, g, 
     mean, variance = image_mean(result)
     require_precision(np.sqrt(variance + noise), 0.015 * expected, f"{name}, {kind}")
     assert np.abs(z_score(mean, variance, expected, noise)).max() < largest_z(len(CASES))
+
+
+def noise(scene, **choices):
+    """Mean over the film of the variance of a sample."""
+    return float(clvol.render(scene, spp=1024, seed=5, **choices).variance.mean()) * 1024
+
+
+def test_the_control_takes_noise_of_a_peak_away():
+    scene = fog(lumps(), 0.99, 0.8)(LAMPS["a sun"])
+    assert noise(scene, shadow_cache="on") < 0.85 * noise(scene, shadow_cache="on", next_event="plain")
+
+
+def test_a_strong_far_and_a_weak_near_light_are_each_sampled_where_they_matter():
+    near = PointEmitter((0.2,), (0.5, 0.5, -0.3))
+    scene = fog(np.full((4, 4, 4), 1.0), 0.9, 0.0)([PointEmitter((40.0,), (0.5, 10.0, 0.5)), near])
+    assert noise(scene) < 0.5 * noise(scene, light_choice="power")
