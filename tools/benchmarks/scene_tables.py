@@ -72,13 +72,16 @@ def show_scenes(figures: Figures) -> None:
 def scene_rows(figures: Figures) -> list[Row]:
     """For each scene the efficiency over the others; then how far the means are apart."""
     rows = [_scene_row(name, scene) for name, scene in figures["scenes"].items()]
-    apart = [abs(z) for scene in figures["scenes"].values() for z in scene["z"].values()]
+    apart = [
+        (abs(z), f"{scene['letter']}, {scene['sides'][kind]['label']}")
+        for scene in figures["scenes"].values()
+        for kind, z in scene["z"].items()
+    ]
     if apart:
-        text = f"{max(apart):.1f} standard errors"
+        most, where = max(apart)
+        text = f"{most:.1f} standard errors ({where})"
         limit = f"within {Z_LIMIT:g} standard errors"
-        rows.append(
-            Row("the largest difference of two means on these scenes", text, limit, max(apart) < Z_LIMIT)
-        )
+        rows.append(Row("the largest difference of two means on these scenes", text, limit, most < Z_LIMIT))
     return rows
 
 
