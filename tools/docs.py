@@ -6,6 +6,7 @@ techniques by `clvol.compare`, the pilot's by tools/pilot.py and the performance
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 import subprocess
@@ -143,6 +144,13 @@ def pilot(spp: int, rounds: int, more: int, scenes: tuple[str, ...], device: str
     metavar="FILE",
     help="Where the six scenes go in short.",
 )
+@click.option(
+    "--figures",
+    "measured",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    metavar="FILE",
+    help="Figures that `tools/bench.py all --json FILE` has measured on this machine, instead of measuring.",
+)
 @click.pass_context
 def performance(
     context: click.Context,
@@ -153,6 +161,7 @@ def performance(
     rough: bool,
     output: Path,
     readme: Path,
+    measured: Path | None,
 ) -> int:
     """The tables of performance.md and of the README, between their markers, from all of tools/bench.py.
 
@@ -163,9 +172,12 @@ def performance(
         raise click.UsageError("rough figures are not for the documentation: give --output and --readme")
     enclosed(output)  # told now, not after the measurements
     between(readme.read_text(encoding="utf-8"), *IN_README, readme.name)
-    _, figures = context.invoke(
-        bench.everything, mitsuba=mitsuba, cycles=cycles, against=against, minutes=minutes, rough=rough
-    )
+    if measured:
+        figures = json.loads(measured.read_text(encoding="utf-8"))
+    else:
+        _, figures = context.invoke(
+            bench.everything, mitsuba=mitsuba, cycles=cycles, against=against, minutes=minutes, rough=rough
+        )
     before, after = enclosed(output)  # as it is by now
     write(output, f"{before}\n{performance_part(figures)}\n{after}")
     if "scenes" in figures:

@@ -197,6 +197,22 @@ def test_tables_have_a_column_for_each_program_and_a_row_for_each_side(tool, mon
     tables.show_scenes(figures)
 
 
+def test_figures_that_were_kept_become_the_tables_of_the_page_and_the_readme(
+    tool, monkeypatch, tmp_path: Path
+) -> None:
+    docs, figures = tool("docs"), measured(tool, monkeypatch)
+    del figures["workers"]
+    page, readme, kept = (tmp_path / name for name in ("page.md", "readme.md", "figures.json"))
+    page.write_text(f"before\n{docs.FIRST}\n{docs.LAST}\nafter\n")
+    readme.write_text("\n".join(docs.IN_README))
+    tool("benchmarks.tables").save(kept, {"scenes": figures})
+    written = ["--output", str(page), "--readme", str(readme), "--figures", str(kept)]
+    outcome = CliRunner().invoke(docs.main, ["performance", *written])
+    assert outcome.exit_code == 1 and "MISSED: scene A" in outcome.output
+    assert "| A | Mitsuba 9.9 | " in page.read_text() and "300 million steps" in page.read_text()
+    assert "| A: a cloud under a white sky | " in readme.read_text()
+
+
 def test_a_revision_that_is_none_is_told(tool, monkeypatch) -> None:
     peers = tool("benchmarks.peers")
     failed = subprocess.CompletedProcess([], 128, b"", b"fatal: not a valid object name: nowhere\n")

@@ -14,7 +14,7 @@ from folders import ROOT
 from benchmarks.efficiency import Rounds, pixel_variance, spread
 from benchmarks.peers import CLVOL, clvol_of
 from benchmarks.scenes import SCENES, write_scene
-from benchmarks.tables import Figures, ranged, show
+from benchmarks.tables import Figures, show
 from clvol.base.extras import need_matplotlib
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ RES = 128
 COLUMNS = {
     "seconds": "seconds",
     "microseconds": "µs of the clock a sample",
-    "cpu_microseconds": "CPU µs a sample",
+    "cpu_microseconds": "CPU µs a sample, set-up too",
     "setup": "set-up, seconds",
     "memory": "peak memory, MiB",
     "error": "relative error",
@@ -114,18 +114,14 @@ def _figures(renders: list[Rendered], res: int, spp: int) -> Figures:
 
 
 def show_curve(figures: Figures) -> None:
-    """A row for each point."""
+    """A row for each point, of medians; their ranges are in the figures."""
     axis = AXES[figures["axis"]]
     rows = [
-        (value, str(point["spp"]), *(_cell(point[name]) for name in COLUMNS))
+        (value, str(point["spp"]), *(f"{point[name]['median']:.3g}" for name in COLUMNS))
         for value, point in figures["points"].items()
     ]
-    title = f"{figures['axis']}: scene {figures['scene']}, {figures['rounds']} rounds"
+    title = f"{figures['axis']}: scene {figures['scene']}, medians of {figures['rounds']} rounds"
     show(title, [axis.unit, "spp", *COLUMNS.values()], rows)
-
-
-def _cell(figure: dict[str, float]) -> str:
-    return f"{figure['median']:.3g}" if figure["least"] == figure["greatest"] else ranged(figure)
 
 
 PANELS = {
