@@ -66,7 +66,7 @@ class Pool:
             raise OptionError(f"a pool of {slots} paths", hint="give 1 to 67108864")
         groups = max(1, -(-slots // plan.tuning.group_slots))
         slots = groups * plan.tuning.group_slots
-        return cls(slots, pass_jobs=2 * slots, ring_jobs=16 * slots)
+        return cls(slots, pass_jobs=4 * slots, ring_jobs=32 * slots)
 
 
 @dataclass
