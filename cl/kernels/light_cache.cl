@@ -6,8 +6,8 @@
 #include "emitter/light_cache.h"
 #include "stages/medium_ray.h"
 
-#define CELL_POINTS 3 /* of a cell, along an axis, at which the extinction is looked up */
-#define CELL_STEPS 2.0f /* of the march through a cell's edge */
+#define CELL_POINTS 2 /* of a cell, along an axis, at which the extinction is looked up */
+#define CELL_STEPS 1.0f /* of the march through a cell's edge */
 
 /* Whether a point is inside the shape and the box that bound a medium; of one that surfaces bound, the box alone. */
 INLINE bool medium_holds(__global const Medium *medium, float3 p)
@@ -91,9 +91,9 @@ INLINE float3 axis_direction(uint side)
 }
 
 /* One work-item a cell of a row: a light's, or a direction's of the sky.  Writes the transmittance and, of lights, the
-   light that a cell receives. */
+   unoccluded light.  The transmittance of a sky's own row is the mean of its directions, which the host takes. */
 __kernel void light_cache_transmittance(CLVOL_ARGUMENTS, __global const float *extinction,
-                                        __global float *transmittance, __global float *received, uint count)
+                                        __global float *transmittance, __global float *irradiance, uint count)
 {
     const Scene scene = CLVOL_SCENE;
     const uint item = (uint)get_global_id(0);
@@ -103,19 +103,17 @@ __kernel void light_cache_transmittance(CLVOL_ARGUMENTS, __global const float *e
     const uint cells = (uint)(cache->size[0] * cache->size[1] * cache->size[2]);
     const uint row = item / cells;
     const float3 p = cell_point(&scene, item % cells, (float3)(0.5f));
-    float through = 0.0f, light = 0.0f;
+    float depth = 0.0f, light = 0.0f;
     if (row < weighed_lights(&scene)) {
         __global const Emitter *emitter = scene.emitters + weighed_light(&scene, row);
         light = light_irradiance(emitter, p);
         float distance = INFINITY;
         const float3 d = light_middle(emitter, p, &distance);
         if (!is_environment(emitter))
-            through = exp(-coarse_depth(&scene, extinction, p, d, distance));
-        for (uint side = 0; is_environment(emitter) && side < 6u; ++side)
-            through += exp(-coarse_depth(&scene, extinction, p, axis_direction(side), INFINITY)) / 6.0f;
+            depth = coarse_depth(&scene, extinction, p, d, distance);
     } else {
-        through = exp(-coarse_depth(&scene, extinction, p, axis_direction(row - weighed_lights(&scene)), INFINITY));
+        depth = coarse_depth(&scene, extinction, p, axis_direction(row - weighed_lights(&scene)), INFINITY);
     }
-    transmittance[item] = through;
-    received[item] = light * through;
+    transmittance[item] = exp(-depth);
+    irradiance[item] = light;
 }

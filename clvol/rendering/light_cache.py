@@ -10,7 +10,7 @@ import pyopencl as cl
 from clvol.device.launch import GROUP, run_kernel, scene_arguments, whole
 from clvol.device.programs import BUILD_OPTIONS, build, light_cache_source
 from clvol.device.side_builds import Launch, Unit
-from clvol.tables.light_cache import light_cache_record, rows, typical_radiance
+from clvol.tables.light_cache import SKY_DIRECTIONS, light_cache_record, rows, typical_radiance
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -47,10 +47,13 @@ def light_cache_buffers(
         run_kernel(device, kernel, len(outputs[0]), arguments, inputs, outputs, [number], purpose=_PURPOSE)
 
     extinction = np.empty(cells, np.float32)
-    transmittance, received = np.empty(count, np.float32), np.empty(count, np.float32)
+    transmittance, irradiance = np.empty(count, np.float32), np.empty(count, np.float32)
     run("light_cache_extinction", [], [extinction])
-    run("light_cache_transmittance", [extinction], [transmittance, received])
-    record["typical"] = typical_radiance(extinction, received.reshape(-1, cells).sum(axis=0))
+    run("light_cache_transmittance", [extinction], [transmittance, irradiance])
+    of_rows = transmittance.reshape(-1, cells)
+    if plan.features.constant or plan.features.envmap:
+        of_rows[0] = of_rows[-SKY_DIRECTIONS:].mean(axis=0)
+    record["typical"] = typical_radiance(extinction, (of_rows * irradiance.reshape(-1, cells)).sum(axis=0))
     return {
         "light_cache": device.memory.upload(record, *_PURPOSE),
         "light_transmittance": device.memory.upload(transmittance, *_PURPOSE),
