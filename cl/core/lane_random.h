@@ -16,6 +16,32 @@ typedef struct {
     Bits x, y;
 } BitsPair;
 
+/* Four numbers of each lane. */
+typedef struct {
+    Bits x, y, z, w;
+} BitsBlock;
+
+/* Which numbers the lanes' paths read. */
+typedef struct {
+    Bits pixel, sample, bounce;
+} LaneKeys;
+
+/* As philox4x32. */
+INLINE BitsBlock philox_lanes(BitsBlock counter, uint2 key)
+{
+    Bits a = counter.x, b = counter.y, c = counter.z, d = counter.w;
+    for (int round = 0; round < 7; ++round) {
+        const Bits high = high_product(a, 0xD2511F53u), low = a * 0xD2511F53u;
+        a = high_product(c, 0xCD9E8D57u) ^ b ^ key.x;
+        b = c * 0xCD9E8D57u;
+        c = high ^ d ^ key.y;
+        d = low;
+        key += (uint2)(0x9E3779B9u, 0xBB67AE85u);
+    }
+    const BitsBlock block = {a, b, c, d};
+    return block;
+}
+
 /* Wellons' lowbias32. */
 INLINE Bits mixed_lanes(Bits x)
 {

@@ -53,6 +53,29 @@ typedef LANES_JOIN(uint, CLVOL_LANES) Bits;
 /* p[i] in every lane, by loads of its own: the gather instructions of processors are slower. */
 #define gather_real(p, i) ((Real)gather(p, i))
 #define gather_int(p, i) ((Int)gather(p, i))
+#define gather_bits(p, i) ((Bits)gather(p, i))
+
+/* Upper half of the product with a number. */
+#if CLVOL_LANES == 1
+INLINE Bits high_product(Bits x, uint factor) { return (uint)(((ulong)x * factor) >> 32); }
+#else
+#if CLVOL_LANES == 16
+typedef ulong8 WideBits;
+#define wide_bits(x) as_ulong8(x)
+#elif CLVOL_LANES == 8
+typedef ulong4 WideBits;
+#define wide_bits(x) as_ulong4(x)
+#else
+typedef ulong2 WideBits;
+#define wide_bits(x) as_ulong2(x)
+#endif
+INLINE Bits high_product(Bits x, uint factor)
+{
+    const WideBits pairs = wide_bits(x); /* of two lanes, the even one in the lower half */
+    const WideBits even = (pairs & 0xFFFFFFFFul) * factor, odd = (pairs >> 32) * factor;
+    return real_bits((even >> 32) | (odd & 0xFFFFFFFF00000000ul));
+}
+#endif
 
 /* NaN-free arguments only. */
 INLINE Real least_of(Real a, Real b) { return a < b ? a : b; }

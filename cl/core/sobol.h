@@ -9,32 +9,43 @@
    samples would. */
 #ifndef CLVOL_CORE_SOBOL_H
 #define CLVOL_CORE_SOBOL_H
+#include "core/lane_random.h"
 #include "core/random.h"
 #include "core/scene.h"
 
 #define SOBOL_SHUFFLED 0x3FFu /* samples are put in another order within runs of so many and one */
 
-INLINE uint reverse_bits(uint x)
-{
-    x = ((x >> 1) & 0x55555555u) | ((x & 0x55555555u) << 1);
-    x = ((x >> 2) & 0x33333333u) | ((x & 0x33333333u) << 2);
-    x = ((x >> 4) & 0x0F0F0F0Fu) | ((x & 0x0F0F0F0Fu) << 4);
-    x = ((x >> 8) & 0x00FF00FFu) | ((x & 0x00FF00FFu) << 8);
-    return (x >> 16) | (x << 16);
-}
-
-/* Owen's nested uniform scrambling of the number whose bits x has in reverse: a bit is flipped by a function of
-   the seed and of the bits before it (Laine and Karras 2011, with Burley's constants).  Uniform seeds
-   give uniform numbers. */
-INLINE uint owen_scramble(uint x, uint seed)
-{
-    x += seed;
-    x ^= x * 0x6C50B47Cu;
-    x ^= x * 0xB82F1E52u;
-    x ^= x * 0xC7AFE638u;
-    x ^= x * 0x8D22F6E6u;
-    return x;
-}
+/* Owen's nested uniform scrambling of a number whose bits x has in reverse: a bit is flipped by a function of the
+   seed and of the bits before it (Laine and Karras 2011, with Burley's constants).  Uniform seeds give uniform
+   numbers. */
+#define DEFINE_SCRAMBLE(reverse_bits, owen_scramble, part_in_turn, Bits) \
+    INLINE Bits reverse_bits(Bits x) \
+    { \
+        x = ((x >> 1) & 0x55555555u) | ((x & 0x55555555u) << 1); \
+        x = ((x >> 2) & 0x33333333u) | ((x & 0x33333333u) << 2); \
+        x = ((x >> 4) & 0x0F0F0F0Fu) | ((x & 0x0F0F0F0Fu) << 4); \
+        x = ((x >> 8) & 0x00FF00FFu) | ((x & 0x00FF00FFu) << 8); \
+        return (x >> 16) | (x << 16); \
+    } \
+    INLINE Bits owen_scramble(Bits x, Bits seed) \
+    { \
+        x += seed; \
+        x ^= x * 0x6C50B47Cu; \
+        x ^= x * 0xB82F1E52u; \
+        x ^= x * 0xC7AFE638u; \
+        x ^= x * 0x8D22F6E6u; \
+        return x; \
+    } \
+    /* Which of the four points of a turn a part takes: one of three orders, so that two blocks pair the halves of     \
+       their numbers in different ways twice out of three times. */ \
+    INLINE Bits part_in_turn(Bits part, Bits hash) \
+    { \
+        return ((Bits)(0x9C78E4u) >> (8u * (hash % 3u) + 2u * part)) & 3u; \
+    }
+DEFINE_SCRAMBLE(reverse_bits, owen_scramble, part_in_turn, uint)
+#if CLVOL_LANES
+DEFINE_SCRAMBLE(reverse_lanes, owen_scramble_lanes, lane_part_in_turn, Bits)
+#endif
 
 /* Wellons' lowbias32. */
 INLINE uint mixed_bits(uint x)
@@ -55,10 +66,6 @@ INLINE uint4 sobol_point(const Scene *scene, uint index)
     return point;
 }
 
-/* Which of the four points of a turn a part takes: one of three orders, so that two blocks pair the halves of their
-   numbers in different ways twice out of three times. */
-INLINE uint part_in_turn(uint part, uint hash) { return (0x9C78E4u >> (8u * (hash % 3u) + 2u * part)) & 3u; }
-
 /* Four numbered dimensions, full 32-bit.  `segment` tells apart the walks of one bounce. */
 INLINE uint4 decision_block(const Scene *scene, SampleKey key, uint block, uint segment)
 {
@@ -77,5 +84,38 @@ INLINE uint4 decision_block(const Scene *scene, SampleKey key, uint block, uint 
     return (uint4)(reverse_bits(owen_scramble(point.x, scramble.x)), reverse_bits(owen_scramble(point.y, scramble.y)),
                    reverse_bits(owen_scramble(point.z, scramble.z)), reverse_bits(owen_scramble(point.w, scramble.w)));
 }
+
+#if CLVOL_LANES
+/* As decision_block, in lanes; for walks, whose blocks keep the order of their numbers. */
+INLINE BitsBlock lane_decisions(const Scene *scene, const LaneKeys *keys, uint block, Bits segment)
+{
+    const uint2 seed = (uint2)(scene->render->seed[0], scene->render->seed[1]);
+    const Bits part = keys->sample % CLVOL_RANDOMIZATIONS, index = keys->sample / CLVOL_RANDOMIZATIONS;
+    const Bits randomization = CLVOL_JOINT ? (Bits)(0u) : part;
+    const Bits number = keys->bounce * 8u + block;
+    const Bits seeds = mixed_lanes(seed.x ^ mixed_lanes(seed.y ^ randomization));
+    const Bits hash = mixed_lanes(keys->pixel ^ mixed_lanes(number ^ (segment << 16) ^ seeds));
+    const Bits order = reverse_lanes(owen_scramble_lanes(reverse_lanes(index), hash));
+    const Bits turn = (order & SOBOL_SHUFFLED) | (index & ~SOBOL_SHUFFLED);
+    Bits left = CLVOL_JOINT ? turn * CLVOL_RANDOMIZATIONS + lane_part_in_turn(part, hash) : turn;
+    const Bits none = (Bits)(0u);
+    BitsBlock point = {none, none, none, none};
+    __global const uint *digits = scene->sobol;
+    for (; lanes_of(MASK(left != 0u)) != 0; left >>= 4, digits += 16 * 4) {
+        const Int at = bits_int(left & 15u) * 4;
+        point.x ^= gather_bits(digits, at);
+        point.y ^= gather_bits(digits + 1, at);
+        point.z ^= gather_bits(digits + 2, at);
+        point.w ^= gather_bits(digits + 3, at);
+    }
+    BitsBlock scramble = {keys->pixel, randomization, number, segment};
+    scramble = philox_lanes(scramble, seed);
+    point.x = reverse_lanes(owen_scramble_lanes(point.x, scramble.x));
+    point.y = reverse_lanes(owen_scramble_lanes(point.y, scramble.y));
+    point.z = reverse_lanes(owen_scramble_lanes(point.z, scramble.z));
+    point.w = reverse_lanes(owen_scramble_lanes(point.w, scramble.w));
+    return point;
+}
+#endif
 
 #endif

@@ -4,6 +4,7 @@
    The lanes take two steps in turn: into the next majorant cells, and look-ups where tentative collisions are, the
    latter when enough lanes wait for one.  What a lane computes depends on its walk alone, so that bits are the same
    at every width. */
+#include "core/sampler.h"
 #include "density/lookup.h"
 #include "majorant/lanes.h"
 #include "path/tally.h"
@@ -112,6 +113,43 @@ typedef struct {
     uint busy_steps; /* of lanes that walked */
 } LanesWalked;
 
+/* Paths of a group that one of its work-items walks, at most, and their blocks of random numbers. */
+#define OWN_PATHS ((CLVOL_GROUP_SLOTS + CLVOL_LOCAL_SIZE - 1) / CLVOL_LOCAL_SIZE)
+
+typedef struct {
+    uint x[OWN_PATHS + CLVOL_LANES], y[OWN_PATHS + CLVOL_LANES], z[OWN_PATHS + CLVOL_LANES], w[OWN_PATHS + CLVOL_LANES];
+} LaneBlocks;
+
+INLINE void store_bits(uint *to, Bits values)
+{
+    for (uint lane = 0; lane < CLVOL_LANES; ++lane)
+        to[lane] = (uint)lane_int(values, lane);
+}
+
+/* The random numbers of all walks at hand, which by the way of vectors cost a fraction. */
+INLINE void lane_blocks(const Scene *scene, __global const uint *slots, uint first, uint stride, uint count,
+                        LaneBlocks *blocks)
+{
+    for (uint n = 0, i = first; i < count; n += CLVOL_LANES) {
+        const Bits none = (Bits)(0u);
+        LaneKeys keys = {none, none, none};
+        Bits segments = none;
+        for (uint lane = 0; lane < CLVOL_LANES && i < count; ++lane, i += stride) {
+            uint segment;
+            const SampleKey key = lane_key(scene, slots[i], &segment);
+            set_lane_int(keys.pixel, lane, (int)key.pixel);
+            set_lane_int(keys.sample, lane, (int)key.sample);
+            set_lane_int(keys.bounce, lane, (int)key.bounce);
+            set_lane_int(segments, lane, (int)segment);
+        }
+        const BitsBlock block = lane_decisions(scene, &keys, LANE_BLOCK, segments);
+        store_bits(blocks->x + n, block.x);
+        store_bits(blocks->y + n, block.y);
+        store_bits(blocks->z + n, block.z);
+        store_bits(blocks->w + n, block.w);
+    }
+}
+
 /* Walks every `stride`th of `count` paths from the `first` on, but begins no more after `budget` steps. */
 INLINE LanesWalked walk_lanes(const Scene *scene, uint group, __global const uint *slots, uint first, uint stride,
                               uint count, uint budget)
@@ -125,7 +163,10 @@ INLINE LanesWalked walk_lanes(const Scene *scene, uint group, __global const uin
     LanePath paths[CLVOL_LANES];
     for (uint lane = 0; lane < CLVOL_LANES; ++lane)
         paths[lane].slot = NO_SLOT;
+    LaneBlocks blocks;
+    lane_blocks(scene, slots, first, stride, count, &blocks);
     LanesWalked walked = {first, 0, 0};
+    uint own = 0;
     uint steps = 0;
     for (;;) {
         uint idle = lanes_of(~state.alive);
@@ -143,6 +184,8 @@ INLINE LanesWalked walk_lanes(const Scene *scene, uint group, __global const uin
                     LaneWalk walk;
                     const uint slot = slots[walked.next];
                     walked.next += stride;
+                    walk.k = (uint4)(blocks.x[own], blocks.y[own], blocks.z[own], blocks.w[own]);
+                    ++own;
                     if (!lane_begin(scene, group, slot, &walk))
                         continue;
                     lane_put(&rays, &kept, lane, &walk);

@@ -3,7 +3,6 @@
 #ifndef CLVOL_STAGES_SAMPLE_LANES_H
 #define CLVOL_STAGES_SAMPLE_LANES_H
 #if CLVOL_LANES
-#include "core/sampler.h"
 #include "path/key.h"
 #include "path/ray.h"
 #include "path/tally.h"
@@ -11,6 +10,14 @@
 #include "stages/media.h"
 #include "stages/medium_collision.h"
 #include "tracking/lanes.h"
+
+#define LANE_BLOCK BLOCK_WALK
+
+INLINE SampleKey lane_key(const Scene *scene, uint slot, uint *segment)
+{
+    *segment = walk_number(scene, path_segment(scene, slot), 0);
+    return path_key(scene, slot);
+}
 
 INLINE bool lane_begin(const Scene *scene, uint group, uint slot, LaneWalk *walk)
 {
@@ -32,8 +39,7 @@ INLINE bool lane_begin(const Scene *scene, uint group, uint slot, LaneWalk *walk
     walk->from = walked.t;
     walk->in = rest_of_ray(medium_ray(scene, scene->media, ray, path_medium_end(scene, slot), channel), walked.t);
 #endif
-    const uint number = walk_number(scene, path_segment(scene, slot), 0);
-    walk->k = leg_block(decision_block(scene, path_key(scene, slot), BLOCK_WALK, number), walked.leg);
+    walk->k = leg_block(walk->k, walked.leg);
     return true;
 }
 

@@ -3,13 +3,20 @@
 #ifndef CLVOL_STAGES_SHADOW_LANES_H
 #define CLVOL_STAGES_SHADOW_LANES_H
 #if CLVOL_LANES
-#include "core/sampler.h"
 #include "path/key.h"
 #include "path/tally.h"
 #include "stages/media.h"
 #include "stages/shadow_ray.h"
 #include CLVOL_TRANSMITTANCE_HEADER
 #include "tracking/lanes.h"
+
+#define LANE_BLOCK BLOCK_SHADOW
+
+INLINE SampleKey lane_key(const Scene *scene, uint slot, uint *segment)
+{
+    *segment = 0;
+    return path_key(scene, slot);
+}
 
 INLINE bool lane_begin(const Scene *scene, uint group, uint slot, LaneWalk *walk)
 {
@@ -31,8 +38,7 @@ INLINE bool lane_begin(const Scene *scene, uint group, uint slot, LaneWalk *walk
     }
     ray.o = span_point(&span, ray);
     walk->in = segment_ray(scene, &inside, 0, ray, span.end - span.start, (int)path_channel(scene, slot));
-    walk->k = leg_block(decision_block(scene, path_key(scene, slot), BLOCK_SHADOW, walk_number(scene, 0, 0)),
-                        walked.leg);
+    walk->k = leg_block(walk->k, walked.leg);
     walk->from = span_t(&span);
     return true;
 }

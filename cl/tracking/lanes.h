@@ -1,7 +1,9 @@
 /* Walks in lanes: what stages and trackers implement, and what they are given.  The loop is in kernels/lanes.cl.
 
-       bool lane_begin(scene, group, slot, &walk);              a stage; false where the path needs no walk and has
-                                                                been handed on
+       SampleKey lane_key(scene, slot, &segment);               a stage; whose numbers of block LANE_BLOCK a walk
+                                                                begins with
+       bool lane_begin(scene, group, slot, &walk);              a stage, given these; false where the path needs no
+                                                                walk and has been handed on
        void lane_end(scene, group, &path, &arrival);            a stage: books a walk, and hands the path on
        Int lane_event(&state, density, k, ready);               a tracker: a tentative collision in the lanes that
                                                                 are ready; returns those whose walks end by it */

@@ -12,6 +12,15 @@ UNIT = """
 
 #define OUTCOME 6u
 
+#define LANE_BLOCK %du
+
+INLINE SampleKey lane_key(const Scene *scene, uint slot, uint *segment)
+{
+    const SampleKey key = {slot, slot + 1u, 0u};
+    *segment = 0u;
+    return key;
+}
+
 INLINE bool lane_begin(const Scene *scene, uint group, uint slot, LaneWalk *walk)
 {
     __global const uint *given = scene->state;
@@ -19,7 +28,6 @@ INLINE bool lane_begin(const Scene *scene, uint group, uint slot, LaneWalk *walk
     ray.o = (float3)(as_float(given[0]), as_float(given[1]), as_float(given[2]));
     ray.d = (float3)(as_float(given[3]), as_float(given[4]), as_float(given[5]));
     walk->in = medium_ray(scene, scene->media, ray, as_float(given[6]), (int)as_float(given[7]));
-    walk->k = philox4x32((uint4)(slot, 0u, 0u, 0u), (uint2)(%d, 77));
     walk->from = 0.0f;
     return true;
 }
@@ -46,8 +54,8 @@ __kernel void lanes(CLVOL_ARGUMENTS, __global const uint *slots, __global uint *
     steps[2 * i + 1] = walked.busy_steps;
 }
 """
-WORK_ITEMS = 64
-"""That share the walks: a group of them."""
+WORK_ITEMS, PATHS = 64, 512
+"""Work-items that share the walks: a group of them, or as many more as walk so many paths each."""
 
 
 def lane_walks(probe, family, ray, length, walks, lanes=8, seed=1, channel=0):
@@ -62,8 +70,9 @@ def lane_walks(probe, family, ray, length, walks, lanes=8, seed=1, channel=0):
     probe.buffers["state"] = memory.upload(record, "a ray", "")
     probe.buffers["results"] = memory.upload(outcomes, "outcomes", "")
     text = UNIT % (f"CLVOL_{family.upper()}_HEADER", seed, walks)
-    slots, steps = np.random.default_rng(2).permutation(walks), np.zeros((WORK_ITEMS, 2), np.uint32)
-    macros = {"CLVOL_LANES": lanes}
-    probe.run_unit("lanes", text, WORK_ITEMS, [slots.astype(np.uint32)], [steps], macros=macros)
+    items = WORK_ITEMS * max(1, walks // (WORK_ITEMS * PATHS))
+    slots, steps = np.random.default_rng(2).permutation(walks), np.zeros((items, 2), np.uint32)
+    macros = {"CLVOL_LANES": lanes, "CLVOL_GROUP_SLOTS": -(-walks // items)}
+    probe.run_unit("lanes", text, items, [slots.astype(np.uint32)], [steps], macros=macros)
     cl.enqueue_copy(queue, outcomes, probe.buffers["results"], is_blocking=True)
     return outcomes, steps

@@ -219,3 +219,37 @@ def test_streams_of_two_seeds_share_no_run_of_numbers(device):
     pairs = found.reshape(-1, 2).astype(np.uint64)
     distinct = len(np.unique(pairs[:, 0] << np.uint64(32) | pairs[:, 1]))
     assert distinct == 64 * (64 + NUMBERS - 1)  # of each key, as many as its counters pass
+
+
+@pytest.mark.parametrize("sampler", registry.SAMPLERS)
+@pytest.mark.parametrize("lanes", WIDTHS)
+def test_lanes_decide_by_the_numbers_that_paths_alone_decide_by(device, sampler, lanes):
+    keys = np.random.default_rng(8).integers(0, 1 << 13, (64, 4), dtype=np.uint32)
+    alone, together = (np.empty((64, 4), np.uint32) for _ in range(2))
+    probe = Probe(device, scene_with("constant"), sampler=sampler)
+    one = """
+    const SampleKey key = {in0[4 * i], in0[4 * i + 1], in0[4 * i + 2]};
+    const uint4 k = decision_block(scene, key, BLOCK_WALK, in0[4 * i + 3]);
+    out0[4 * i] = k.x, out0[4 * i + 1] = k.y, out0[4 * i + 2] = k.z, out0[4 * i + 3] = k.w;
+    """
+    probe.run([], one, [alone], [keys])
+    many = """
+    if (i % CLVOL_LANES != 0)
+        return;
+    const Bits none = (Bits)(0u);
+    LaneKeys keys = {none, none, none};
+    Bits segment = none;
+    for (uint n = 0; n < CLVOL_LANES; ++n) {
+        __global const uint *key = in0 + 4 * (i + n);
+        ((uint *)&keys.pixel)[n] = key[0], ((uint *)&keys.sample)[n] = key[1];
+        ((uint *)&keys.bounce)[n] = key[2], ((uint *)&segment)[n] = key[3];
+    }
+    const BitsBlock k = lane_decisions(scene, &keys, BLOCK_WALK, segment);
+    for (uint n = 0; n < CLVOL_LANES; ++n) {
+        __global uint *out = out0 + 4 * (i + n);
+        out[0] = ((const uint *)&k.x)[n], out[1] = ((const uint *)&k.y)[n];
+        out[2] = ((const uint *)&k.z)[n], out[3] = ((const uint *)&k.w)[n];
+    }
+    """
+    probe.run([], many, [together], [keys], macros={"CLVOL_LANES": lanes})
+    assert len(np.unique(alone)) > 250 and (alone == together).all()
