@@ -21,19 +21,24 @@ INLINE bool depth_is_reached(const Scene *scene, uint slot, uint bounce, Spectru
     return false;
 }
 
-/* Whether the path goes on from the scattering numbered `bounce` only if it survives roulette.  `weight`: what it would
-   carry on; NaN goes on, to be seen. */
-INLINE bool meets_roulette(const Scene *scene, uint bounce, float weight)
+/* With which probability a path survives roulette at the scattering numbered `bounce` (METHODS §6).  `weight`: what it
+   would carry on; NaN goes on, to be seen.  What weighs less than some least weight survives in proportion, and weighs
+   as much then: 1 from rr_depth on.  Before, with roulette "weight", it is a half at surfaces from the second
+   scattering on, since the first makes whole pixels dark; media have absorption "mixed".  In a room with smoke (albedos
+   of 0.7 and 0.8) that was 1.5 times as efficient as following all, and a least weight of 1 at once 1.2 times. */
+INLINE float roulette_survival(const Scene *scene, uint bounce, float weight, bool at_surface)
 {
-    return bounce > scene->render->rr_depth && weight < 1.0f;
+    const float early = CLVOL_ROULETTE == ROULETTE_WEIGHT && at_surface && bounce > 1 ? 0.5f : 0.0f;
+    const float least = bounce > scene->render->rr_depth ? 1.0f : early;
+    return weight < least ? weight / least : 1.0f;
 }
 
-/* Roulette of a path of weight below 1, by the random number k. */
-INLINE bool survives_roulette(uint k, float weight, Spectrum *beta)
+/* Roulette of a path whose survival is less than certain, by the random number k. */
+INLINE bool survives_roulette(uint k, float survival, Spectrum *beta)
 {
-    if (!(uniform_float(k) < weight)) /* uniform_float may round to 1 */
+    if (!(uniform_float(k) < survival)) /* uniform_float may round to 1 */
         return false;
-    *beta /= weight;
+    *beta /= survival;
     return true;
 }
 

@@ -115,7 +115,8 @@ INLINE bool scatter(const Scene *scene, uint slot, SampleKey key, __global const
                                    uniform_float(k.w), &pdf);
     *shadow_ray = next_event(scene, slot, key, medium, ray.o, ray.d, wi, beta);
     const float weight = spectrum_max(beta) * path_eta_squared(scene, slot);
-    if (meets_roulette(scene, key.bounce, weight) && !survives_roulette(k.z, weight, &beta))
+    const float survival = roulette_survival(scene, key.bounce, weight, false);
+    if (survival < 1.0f && !survives_roulette(k.z, survival, &beta))
         return false;
     set_path_pdf(scene, slot, medium->sample_emitters ? pdf : 0.0f);
     set_path_direction(scene, slot, wi);

@@ -108,8 +108,8 @@ INLINE bool leave_surface(const Scene *scene, uint slot, SampleKey key, const Su
     const float weight = spectrum_max(beta) * eta_squared;
     if (weight == 0.0f) /* not so for NaN, which is to be seen */
         return false;
-    if (meets_roulette(scene, key.bounce, weight) &&
-        !survives_roulette(decision_block(scene, key, BLOCK_DIRECTION, 0).z, weight, &beta))
+    const float survival = roulette_survival(scene, key.bounce, weight, true);
+    if (survival < 1.0f && !survives_roulette(decision_block(scene, key, BLOCK_DIRECTION, 0).z, survival, &beta))
         return false;
     Inside inside = path_inside(scene, slot);
     cross_boundary(scene->shapes + surface->shape, surface->ng, d, &inside);

@@ -207,6 +207,7 @@ ENUMS = {
     "TEXTURE": ("BITMAP", "CHECKERBOARD"),
     "WRAP": ("REPEAT", "MIRROR", "CLAMP"),
     "ABSORPTION": ("SAMPLE", "WEIGHT", "MIXED"),
+    "ROULETTE": ("DEPTH", "WEIGHT"),
     "PROBABILITY": ("HISTORY", "AVERAGE", "MAX"),
     "COUNTER": ("NEXT_JOB", "JOB_LIMIT", "NON_FINITE", "DONE"),  # DONE: one counter per pass in the ring
 }

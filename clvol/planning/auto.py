@@ -42,6 +42,7 @@ def resolve(
         "lookup": ("exact", "the volume's own filter"),
         "absorption": ("mixed", "no path is absorbed that weighs much, none followed that weighs little"),
         "gathering": ("strata", "a point in each stratum of a flight has a fraction of one point's noise"),
+        "roulette": _roulette(features),
         "probability": ("history", "weights stay bounded"),
         "control": ("mean", "leaves the least residual to estimate"),
         "shadow_cache": ("on", "shadow rays that would bring next to nothing are rarely traced"),
@@ -90,6 +91,13 @@ def _technique(features: Features, asked: Mapping[str, str]) -> tuple[str, str]:
             "collisions are the light, and one low-discrepancy number places a whole flight",
         )
     return "delta", f"regular would not pay: {against[0]}"
+
+
+def _roulette(features: Features) -> tuple[str, str]:
+    """Paths in media end by absorption; where a flame glows on exact flights, more ends doubled its noise."""
+    if features.reflecting:
+        return "weight", "what weighs little after a surface is not worth following for rr_depth scatterings"
+    return "depth", "no surface scatters"
 
 
 def _transmittance(features: Features) -> tuple[str, str]:

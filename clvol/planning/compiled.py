@@ -98,6 +98,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_LIGHT_CHOICE": int(plan.light_choice),
         "CLVOL_DIRECTION_CONTROL": int(plan.direction_control),
         "CLVOL_ABSORPTION": layout.enum("ABSORPTION", plan.chosen["absorption"]),
+        "CLVOL_ROULETTE": layout.enum("ROULETTE", plan.chosen["roulette"]),
         "CLVOL_PROBABILITY": layout.enum("PROBABILITY", plan.chosen["probability"]),
     }
 

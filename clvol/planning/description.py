@@ -48,7 +48,7 @@ def _defined(plan: Decisions, macros: layout.Macros) -> Iterator[str]:
         name = macro.removeprefix("CLVOL_")
         if name in ("LOCAL_SIZE", "GROUP_SLOTS") and not plan.tuning.known:
             continue
-        if name in ("ABSORPTION", "PROBABILITY"):
+        if name in ("ABSORPTION", "ROULETTE", "PROBABILITY"):
             if used[name.lower()] != "none":
                 yield f"{name}={layout.ENUMS[name][value]}"
         elif value:

@@ -22,6 +22,7 @@ def used_names(plan: Decisions) -> Names:
     interpolates = features.trilinear or not features.nearest
     on_walks = walks and plan.weighted and plan.extinction == 3
     absorbed = features.scattering and features.chromatic_albedo and chosen["absorption"] == "sample"
+    roulette = chosen["roulette"] if features.reflecting else "depth"
     used = {
         "technique": chosen["technique"] if walks else analytic,
         "transmittance": (chosen["transmittance"] if walks else analytic) if plan.nee else "none",
@@ -29,6 +30,7 @@ def used_names(plan: Decisions) -> Names:
         "lookup": chosen["lookup"] if walks and interpolates else "none",
         "absorption": chosen["absorption"] if features.media and features.scattering else "none",
         "gathering": chosen["gathering"] if plan.gathers_on_flights else "none",
+        "roulette": roulette if features.scattering or features.reflecting else "none",
         "probability": chosen["probability"] if plan.spectrum == 3 and (on_walks or absorbed) else "none",
         "control": chosen["control"] if plan.needs_residuals else "none",
         "sampler": chosen["sampler"],
@@ -69,6 +71,7 @@ def reasons(plan: Decisions) -> dict[str, str]:
         "lookup": "samples are not interpolated" if features.heterogeneous else "no density is looked up",
         "absorption": "no medium scatters",
         "gathering": "no exact flight meets emission",
+        "roulette": "no surface scatters" if features.scattering else "nothing scatters",
         "probability": "no path chooses between events by weights of several channels",
         "control": "only residual-ratio subtracts one",
         "sampler": "",
@@ -92,6 +95,8 @@ def _instead(plan: Decisions, family: str, used: str) -> str:
         return ": shadow rays, whose transmittance is analytic here"
     if plan.features.chromatic_extinction and plan.tracker.all_channels:
         return ": one path follows all channels, however far apart; its flights are analytic here"
+    if family == "roulette":
+        return f" is not used: it is for surfaces that scatter, and there are none; {used} is"
     return f" is not used: the scene's media need only the {used} rule"
 
 

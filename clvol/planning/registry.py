@@ -141,6 +141,10 @@ ABSORPTIONS = {
     "weight": Choice("a collision multiplies the path's weight by the albedo"),
     "mixed": Choice("by weight while the path's weight is above 1/2, sampled below"),
 }
+ROULETTES = {
+    "depth": Choice("from rr_depth scatterings on, a path survives with its weight as probability"),
+    "weight": Choice("at surfaces before that too, with twice its weight where it weighs less than 1/2"),
+}
 PROBABILITIES = {
     "history": Choice("events in proportion to the mean of weight times coefficient: weights stay bounded"),
     "average": Choice("events in proportion to the mean coefficient of the channels"),
@@ -194,6 +198,7 @@ FAMILIES = {
     "lookup": LOOKUPS,
     "absorption": ABSORPTIONS,
     "gathering": GATHERINGS,
+    "roulette": ROULETTES,
     "probability": PROBABILITIES,
     "control": CONTROLS,
     "sampler": SAMPLERS,
@@ -209,6 +214,7 @@ FAMILY_PURPOSE = {
     "lookup": "How the density is looked up.",
     "absorption": "How absorption is treated.",
     "gathering": "Where exact flights gather emission.",
+    "roulette": "When paths that carry little are ended.",
     "probability": "How a spectral technique chooses events.",
     "control": "What residual-ratio subtracts.",
     "sampler": "How the samples of a pixel are drawn.",

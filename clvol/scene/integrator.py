@@ -17,6 +17,7 @@ CHOICES = (
     "lookup",
     "absorption",
     "gathering",
+    "roulette",
     "probability",
     "control",
     "sampler",

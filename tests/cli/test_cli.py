@@ -274,6 +274,7 @@ def test_options_reach_render_unchanged(scene: str, tmp_path: Path, monkeypatch:
         "lookup": "auto",
         "absorption": "auto",
         "gathering": "auto",
+        "roulette": "auto",
         "probability": "history",
         "control": "auto",
         "sampler": "auto",

@@ -33,6 +33,7 @@ CHOICES = {
     "lookup": "exact",
     "absorption": "weight",
     "gathering": "collision",
+    "roulette": "depth",
     "probability": "max",
     "control": "min",
     "sampler": "sobol",

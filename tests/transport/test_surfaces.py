@@ -20,11 +20,11 @@ WHITE, BLACK = Diffuse((1.0,)), Diffuse((0.0,))
 UNIT = (-1, -1, -1), (1, 1, 1)
 
 
-def show(scene, spp=1 << 12, seed=1):
+def show(scene, spp=1 << 12, seed=1, **choices):
     """With light sampling where there is anything that asks for it, else without."""
     if len(scene.emitters) > 1:
-        return render(scene, spp=spp, seed=seed, transmittance="ratio", majorant="grid")
-    return render(scene, spp=spp, seed=seed, transmittance="none", absorption="weight")
+        return render(scene, spp=spp, seed=seed, transmittance="ratio", majorant="grid", **choices)
+    return render(scene, spp=spp, seed=seed, transmittance="none", absorption="weight", **choices)
 
 
 def plate(height=0.0, half=1.0, down=False, **keywords):
@@ -282,9 +282,10 @@ def integrating_sphere(depth, make=found, reflectance=0.7):
 @pytest.mark.parametrize("depth", [0, 1, 2, 3, 6])
 def test_depth_counts_scatterings_and_neither_boundaries_nor_holes(depth):
     expected = sum(0.7**k for k in range(depth))
-    result = show(integrating_sphere(depth), spp=256)
+    result = show(integrating_sphere(depth), spp=256, roulette="depth")
     assert np.abs(result.image - expected).max() < 1e-4
-    light_sampled = show(integrating_sphere(depth, sampled), spp=256)  # no less: all lights are equal there
+    # no less with sampled lights: all are equal there
+    light_sampled = show(integrating_sphere(depth, sampled), spp=256, roulette="depth")
     assert np.abs(light_sampled.image - expected).max() < 1e-4
 
 
