@@ -89,6 +89,8 @@ def reasons(plan: Decisions) -> dict[str, str]:
 
 def _instead(plan: Decisions, family: str, used: str) -> str:
     """What is to be said of a choice that was made, and is not in force as it stands."""
+    if family == "lanes":
+        return f" is not used: {reasons(plan)[family]}"
     if used == "none":
         return f" is not used: nothing in this render needs {'an' if family[0] in 'aeiou' else 'a'} {family}"
     if family == "transmittance":
@@ -109,6 +111,8 @@ def warnings(plan: Decisions, asked: Mapping[str, str]) -> Iterator[str]:
     """
     used, features = used_names(plan), plan.features
     for family, value in asked.items():
+        if (family, value) == ("lanes", "off"):
+            continue  # where no walk could go in lanes, none does
         if value not in ("auto", used[family]):
             yield f"{family} {value}{_instead(plan, family, used[family])}"
     if plan.choices.majorant_scale != 1 and used["majorant"] == "none":

@@ -7,6 +7,8 @@ from pictures import box, gridded, hg, homogeneous, picture, volume
 from stat_tests import assert_same_picture, seed_of
 
 import clvol
+from clvol.planning.choices import Choices
+from clvol.planning.in_force import warnings
 from clvol.planning.plan import Plan
 from clvol.planning.settled import Tuning
 from clvol.scene.records import ConstantEmitter, DirectionalEmitter
@@ -138,3 +140,9 @@ def test_a_device_decides_where_nobody_else_does():
     mixed = " ".join(str(clvol.plan(cloud(), technique="spectral", lanes="4")).split())
     assert "medium_sample one path at a time: technique spectral" in mixed
     assert "shadow_transmittance 4 paths at a time" in mixed
+
+
+def test_lanes_that_nothing_can_use_are_told_with_the_reason():
+    several = Plan.of(cloud(more=[BESIDE]), Choices(lanes="8"))
+    assert list(warnings(several, {"lanes": "8"})) == ["lanes 8 is not used: there are several media"]
+    assert not list(warnings(several, {"lanes": "off"}))
