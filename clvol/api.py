@@ -45,6 +45,7 @@ def render(
     absorption: str = "auto",
     gathering: str = "auto",
     roulette: str = "auto",
+    background: str = "auto",
     probability: str = "auto",
     control: str = "auto",
     sampler: str = "auto",
@@ -71,7 +72,8 @@ def render(
         From `load_file` or `load_dict`.
     spp, seed
         Samples per pixel and 64-bit seed. They default to the scene's.
-    technique, transmittance, majorant, lookup, absorption, roulette, gathering, probability, control
+    technique, transmittance, majorant, lookup, absorption, roulette, gathering, background, probability,
+    control
         Names from `clvol.planning.registry`. "auto" takes the scene's own choice, else follows fixed rules,
         so that the same seed gives the same bits. Technique "auto:pilot" has a short measured pilot choose
         technique, transmittance and majorant, where they are left at "auto". ``result.metadata["repeat"]``
@@ -178,9 +180,9 @@ def plan(scene: Scene, **choices: Any) -> Plan:
     Parameters
     ----------
     scene : from `load_file` or `load_dict`.
-    choices : technique, transmittance, majorant, lookup, absorption, roulette, gathering, probability,
-        control, sampler, shadow_cache, light_choice, next_event, lanes, majorant_scale, step, target_error,
-        aov, as for `render`.
+    choices : technique, transmittance, majorant, lookup, absorption, roulette, gathering, background,
+        probability, control, sampler, shadow_cache, light_choice, next_event, lanes, majorant_scale, step,
+        target_error, aov, as for `render`.
 
     Returns
     -------

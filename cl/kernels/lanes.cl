@@ -61,8 +61,8 @@ INLINE LaneArrival lane_arrival(const LaneRays *rays, const LaneState *state, ui
 {
     LaneArrival arrival;
     const uint lookups = (uint)lane_int(state->lookups, lane);
-    arrival.t = lane_of(state->t, lane);
     arrival.happened = lane_int(state->happened, lane) != 0;
+    arrival.t = LANE_FLIES_ON && arrival.happened ? lane_of(state->met, lane) : lane_of(state->t, lane);
     arrival.estimate = lane_of(state->estimate, lane);
     Tally tally = {lookups,
                    lookups,
@@ -159,7 +159,8 @@ INLINE LanesWalked walk_lanes(const Scene *scene, uint group, __global const uin
     const Real zero = (Real)(0.0f);
     const Int none = (Int)(0);
     LaneRays rays = {zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, none};
-    LaneState state = {zero, zero, zero, zero, zero, {int_bits(none), int_bits(none)}, none, none, none, none, none};
+    LaneState state = {zero, zero, zero, zero, zero, zero, {int_bits(none), int_bits(none)},
+                       none, none, none, none, none};
     LanePath paths[CLVOL_LANES];
     for (uint lane = 0; lane < CLVOL_LANES; ++lane)
         paths[lane].slot = NO_SLOT;
@@ -228,7 +229,7 @@ INLINE LanesWalked walk_lanes(const Scene *scene, uint group, __global const uin
         const BitsPair k = lane_pair(&state.stream, ready);
         const Int ended = lane_event(&state, found, k.x, ready);
         state.depth = ready ? lane_exponential(k.y) * rays.per_depth : state.depth;
-        state.happened |= ended;
+        state.happened |= LANE_FLIES_ON ? none : ended;
         state.alive &= ~ended & ~(ready & MASK(state.lookups >= (int)WALK_STEPS));
     }
 }

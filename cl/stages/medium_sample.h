@@ -12,6 +12,7 @@
 #include "path/ray.h"
 #include "path/tally.h"
 #include "path/transitions.h"
+#include "stages/background.h"
 #include "stages/medium_collision.h"
 
 /* The one medium of the scene, from the ray's start.  Returns the steps that it took. */
@@ -29,7 +30,9 @@ INLINE uint medium_sample(const Scene *scene, uint group, uint slot)
     collision.emission = (Spectrum)(0.0f);
     const bool collided = medium_collision(&in, k, &tally, &collision);
     const bool stopped = goes_on(walked, &tally);
-#if CLVOL_WEIGHTED
+#if CLVOL_EXPECTS_BACKGROUND
+    expect_background(scene, slot, collision.through, !collided);
+#elif CLVOL_WEIGHTED
     subtract_background(scene, slot, in.medium, in.channel, collision.beta);
 #endif
     record_walk(scene, slot, tally, collision.beta, collision.emission);

@@ -7,6 +7,7 @@
 #include "path/ray.h"
 #include "path/tally.h"
 #include "path/transitions.h"
+#include "stages/background.h"
 #include "stages/media.h"
 #include "stages/medium_collision.h"
 #include "tracking/lanes.h"
@@ -50,6 +51,9 @@ INLINE void lane_end(const Scene *scene, uint group, const LanePath *path, const
     const Walked walked = take_walked(scene, slot, path->from);
     const bool stopped = goes_on(walked, &tally);
     record_tally(scene, slot, tally);
+#if CLVOL_EXPECTS_BACKGROUND
+    expect_background(scene, slot, arrival->estimate, !arrival->happened);
+#endif
     uint event = path_event(scene, slot);
     if (stopped) {
         set_walked(scene, slot, walk_on(walked, path->from, tally.stop_t));

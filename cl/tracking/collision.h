@@ -11,6 +11,9 @@ typedef struct {
     float t;           /* out: ray parameter of the collision */
     Spectrum beta;     /* in and out: weight of the path */
     Spectrum emission; /* in and out: emitted light that reached the path's start, weighted */
+#if CLVOL_EXPECTS_BACKGROUND
+    float through; /* out: estimate of the transmittance of the whole stretch */
+#endif
 } Collision;
 
 /* Ends a real collision's walk. */

@@ -25,6 +25,7 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
 
 #if CLVOL_LANES
 #define LANE_COLLIDES 1 /* walks end by real collisions */
+#define LANE_FLIES_ON 0
 
 INLINE Int lane_event(LaneState *state, Real density, Bits k, Int ready)
 {

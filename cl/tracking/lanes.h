@@ -38,6 +38,7 @@ typedef struct {
 /* Where the walks stand.  Depths, and bounds of density, leave the medium's scale out. */
 typedef struct {
     Real t, t_end, bound, depth, estimate;
+    Real met; /* where they collided, of walks that go on behind */
     LaneStream stream;
     Int lookups, cells, violations, happened, alive;
 } LaneState;

@@ -25,6 +25,7 @@ INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream
 
 #if CLVOL_LANES
 #define LANE_COLLIDES 0 /* walks end by roulette */
+#define LANE_FLIES_ON 0
 
 INLINE Int lane_event(LaneState *state, Real density, Bits k, Int ready)
 {

@@ -44,6 +44,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_DENSITY_CHANNELS": 3 if f.coloured_extinction else 1,
         "CLVOL_EMISSION_ON_WALKS": int(f.emission and not f.media_overlap),
         "CLVOL_EMISSION_AT_COLLISIONS": int(f.emission and f.media_overlap),
+        "CLVOL_EXPECTS_BACKGROUND": int(plan.expects_background),
         "CLVOL_FLIGHT_STRATA": plan.flight_strata,
         "CLVOL_HAS_EMISSION_VOLUME": int(f.emission_volumes),
         "CLVOL_HAS_TEMPERATURE": int(f.temperature),
@@ -108,7 +109,7 @@ def filled_slots(plan: Decisions) -> dict[str, str]:
     majorant = registry.MAJORANTS.get(plan.chosen["majorant"], registry.Choice(""))
     heads = {
         "sampler": registry.SAMPLERS[plan.chosen["sampler"]].header,
-        "technique": plan.tracker.header,
+        "technique": "tracking/delta_through.h" if plan.expects_background else plan.tracker.header,
         "transmittance": plan.estimator.header,
         "majorant": "majorant/tree_grid.h" if plan.has_tree_grid else majorant.header,
         "lookup": registry.LOOKUPS[plan.chosen["lookup"]].header,

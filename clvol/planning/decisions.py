@@ -145,6 +145,19 @@ class Decisions:
         return emits and self.chosen["technique"] == "regular"
 
     @property
+    def may_expect_background(self) -> bool:
+        """Walks might: through one medium alone, without surfaces, under lights at infinity."""
+        f = self.features
+        light = f.constant or f.envmap or f.directional
+        alone = f.media == 1 and f.heterogeneous and not f.surfaces and not f.emission and f.scattering
+        return light and alone and self.chosen["technique"] == "delta"
+
+    @property
+    def expects_background(self) -> bool:
+        """Walks do."""
+        return self.may_expect_background and self.chosen["background"] == "expected"
+
+    @property
     def flight_strata(self) -> int:
         """Points of an exact flight at which emission is gathered."""
         strata = self.gathers_on_flights and self.chosen["gathering"] == "strata"

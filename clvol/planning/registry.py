@@ -154,6 +154,12 @@ GATHERINGS = {
     "collision": Choice("at the collision"),
     "strata": Choice("at strata of the whole flight, the collision's among them: less noise, longer walks"),
 }
+BACKGROUNDS = {
+    "sampled": Choice("a walk that gets through a medium sees what is behind, one that collides does not"),
+    "expected": Choice(
+        "by the transmittance, which walks go on to estimate: less noise of whether a path collides"
+    ),
+}
 CONTROLS = {
     "mean": Choice("the mean density of each majorant cell, less where thick cells may have gaps"),
     "min": Choice("the least density of each majorant cell"),
@@ -199,6 +205,7 @@ FAMILIES = {
     "absorption": ABSORPTIONS,
     "gathering": GATHERINGS,
     "roulette": ROULETTES,
+    "background": BACKGROUNDS,
     "probability": PROBABILITIES,
     "control": CONTROLS,
     "sampler": SAMPLERS,
@@ -215,6 +222,7 @@ FAMILY_PURPOSE = {
     "absorption": "How absorption is treated.",
     "gathering": "Where exact flights gather emission.",
     "roulette": "When paths that carry little are ended.",
+    "background": "How light from behind a medium is weighed.",
     "probability": "How a spectral technique chooses events.",
     "control": "What residual-ratio subtracts.",
     "sampler": "How the samples of a pixel are drawn.",

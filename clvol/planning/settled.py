@@ -12,6 +12,11 @@ samples fell short of the thin channel by 11, 20, 57 and 81 % at r = 1e-3, 1e-4,
 12, 12 and 3 %."""
 
 
+THIN = 1.0
+"""Optical depth across a medium up to which walks go on behind their collisions for what is behind.  In wisps
+of depth 0.4 under a sun it made pictures 1.3 times as efficient."""
+
+
 @dataclass(frozen=True)
 class Settled:
     """What only the volumes show.
@@ -22,6 +27,7 @@ class Settled:
     costs : expected cost per ray of each kind that was weighed for "auto".
     channels_apart : ratio of two channels' largest extinctions, in the medium where it is largest.
     top_trees : some volume's top grid is a tree.
+    depth : optical depth across the medium, on the mean, where there is one; about.
     tree_grid : the majorant is a grid whose cells are found through a tree.
     """
 
@@ -30,6 +36,7 @@ class Settled:
     channels_apart: float = 1.0
     top_trees: bool = False
     tree_grid: bool = False
+    depth: float = float("inf")
 
     @property
     def reason(self) -> str:

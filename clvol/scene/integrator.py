@@ -18,6 +18,7 @@ CHOICES = (
     "absorption",
     "gathering",
     "roulette",
+    "background",
     "probability",
     "control",
     "sampler",

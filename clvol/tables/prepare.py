@@ -12,7 +12,7 @@ from clvol.planning.settled import Settled
 from clvol.scene.boundaries import scene_sphere
 from clvol.scene.medium_facts import Matter, number_matter
 from clvol.scene.thinness import check_thinness
-from clvol.tables.apart import channels_apart
+from clvol.tables.apart import channels_apart, depth_across
 from clvol.tables.camera_medium import check_camera_medium
 from clvol.tables.majorants import Majorants, PreparedMajorant, choose_majorants
 from clvol.tables.surfaces import Surfaces, prepare_surfaces
@@ -94,6 +94,7 @@ def prepare(scene: Scene, plan: Plan | None = None) -> PreparedScene:
         majorants.costs,
         channels_apart(kept.matter, kept.volumes),
         top_trees=any(volume.bricks.levels for volume in kept.volumes),
+        depth=depth_across(kept.matter, kept.volumes),
         tree_grid=any(table is not None and table.links is not None for table in majorants.tables),
     )
     parts = kept.centre, kept.radius, kept.surfaces, kept.matter, kept.volumes

@@ -275,6 +275,7 @@ def test_options_reach_render_unchanged(scene: str, tmp_path: Path, monkeypatch:
         "absorption": "auto",
         "gathering": "auto",
         "roulette": "auto",
+        "background": "auto",
         "probability": "history",
         "control": "auto",
         "sampler": "auto",

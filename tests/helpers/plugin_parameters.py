@@ -34,6 +34,7 @@ CHOICES = {
     "absorption": "weight",
     "gathering": "collision",
     "roulette": "depth",
+    "background": "sampled",
     "probability": "max",
     "control": "min",
     "sampler": "sobol",

@@ -166,7 +166,7 @@ CASES = {
     ),
     "a medium, a channel a path": (
         lambda: scene(cloud=cube(cloud(COLOURED)), sky=SKY),
-        {"technique": "delta", "transmittance": "ratio"},
+        {"technique": "delta", "transmittance": "ratio", "background": "expected"},
     ),
 }
 

@@ -74,8 +74,8 @@ def trace_ray(
     progress
         Called with (steps done, steps in all, what is next).
     **choices
-        majorant, lookup, absorption, roulette, gathering, probability, control, majorant_scale and step, as
-        for `render`.
+        majorant, lookup, absorption, roulette, gathering, background, probability, control, majorant_scale
+        and step, as for `render`.
 
     Returns
     -------

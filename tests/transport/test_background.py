@@ -1,0 +1,103 @@
+"""What is behind a medium, added by the transmittance instead of by chance, shows the same picture.
+
+False alarms: 1e-4 for each comparison, at fixed seeds.
+"""
+
+import functools
+
+import numpy as np
+import pytest
+from pictures import assert_matches, box, gridded, picture, volume
+from stat_tests import assert_same_picture, seed_of
+
+import clvol
+from clvol import render
+from clvol.scene.records import ConstantEmitter, DirectionalEmitter
+from clvol.tables import media
+
+CUBE = (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0)
+SKY, SUN = ConstantEmitter((0.3,)), DirectionalEmitter((0.6, -0.8, 0.0), (4.0,))
+LUMPS = np.random.default_rng(6).random((9, 8, 7), dtype=np.float32) ** 3
+WAYS = [
+    {"lanes": "16", "majorant": "grid"},
+    {"lanes": "off", "majorant": "grid"},
+    {"lanes": "4", "majorant": "global", "lookup": "stochastic"},
+]
+
+
+def scene(lights=(SKY, SUN), albedo=0.9, scale=2.0, **integrator):
+    medium = gridded(volume(LUMPS, *CUBE), albedo, scale=scale)
+    eye, towards = (0.4, 0.5, -4.0), (0.0, 0.0, 0.0)
+    return picture([box(*CUBE, medium)], lights, eye, towards, 30.0, (8, 8), **integrator)
+
+
+@functools.cache
+def shown(background, spp=1 << 11, limits=(), **options):
+    seed = seed_of("background", background, *limits, *options.values())
+    options = {"technique": "delta", "background": background} | options
+    return render(scene(**dict(limits)), spp=spp, seed=seed, **options)
+
+
+@pytest.mark.parametrize("way", WAYS, ids=lambda way: "-".join(way.values()))
+def test_the_picture_is_the_same(way):
+    expected, sampled = shown("expected", **way), shown("sampled", **WAYS[0])
+    assert expected.metadata["background"] == "expected"
+    assert_same_picture(expected, sampled)
+
+
+@pytest.mark.parametrize("way", WAYS[:2], ids=lambda way: "-".join(way.values()))
+def test_it_is_less_noisy_where_the_transmittance_is_well_known(way):
+    """Loose majorants make for many look-ups."""
+    limits = (("lights", (DirectionalEmitter((0.6, -0.8, 0.0), (12.0,)),)), ("scale", 0.7))
+    options = {"spp": 256, "limits": limits, "majorant_scale": 4.0} | way
+    noise = {name: shown(name, **options).noise for name in ("expected", "sampled")}
+    assert noise["expected"] < 0.8 * noise["sampled"]
+
+
+@pytest.mark.parametrize("wrong", [0.0, 4.0, -3.0], ids=["zero", "too bright", "negative"])
+@pytest.mark.parametrize("way", WAYS[:2], ids=lambda way: "-".join(way.values()))
+def test_any_guess_of_what_collisions_bring_has_the_same_mean(monkeypatch, way, wrong):
+    monkeypatch.setattr(media, "expected_albedo", lambda medium: np.full(3, wrong))
+    options = {"technique": "delta", "background": "expected"} | way
+    result = render(scene(), spp=1 << 11, seed=seed_of("guess", wrong, *way.values()), **options)
+    assert_same_picture(result, shown("sampled", **WAYS[0]))
+
+
+@pytest.mark.parametrize("way", WAYS[:2], ids=lambda way: "-".join(way.values()))
+def test_what_is_seen_through_a_medium_that_nothing_scatters_twice_in_is_its_transmittance(way):
+    """max_depth 1 leaves only what gets through: the sky's radiance times exp(-depth)."""
+    medium = gridded(volume(np.ones((4, 4, 4), np.float32), *CUBE), 0.5, scale=0.7)
+    eye, towards = (0.0, 0.0, -900.0), (0.0, 0.0, 0.0)
+    seen = picture([box(*CUBE, medium)], [SKY, SUN], eye, towards, 1e-3, (4, 4), max_depth=1)
+    options = {"technique": "delta", "background": "expected"} | way
+    result = render(seen, spp=1 << 15, seed=5, **options)
+    assert_matches(result, 0.3 * np.exp(-1.4), bias=0.015)
+
+
+@pytest.mark.parametrize("way", WAYS[:2], ids=lambda way: "-".join(way.values()))
+def test_a_furnace_has_no_noise(way):
+    """Where collisions bring what is behind, nothing is left to chance."""
+    furnace = scene([ConstantEmitter((1.0,))], albedo=1.0)
+    result = render(furnace, spp=16, seed=2, technique="delta", background="expected", **way)
+    assert result.image == pytest.approx(1.0, rel=1e-4)
+
+
+@pytest.mark.parametrize("way", WAYS[:2], ids=lambda way: "-".join(way.values()))
+def test_walks_of_several_legs_neither_lose_nor_double_it(bounds, way):
+    bounds(WALK_STEPS=1)
+    options = {"technique": "delta", "background": "expected"} | way
+    result = render(scene(scale=5.0), spp=1 << 11, seed=8, **options)
+    assert_same_picture(result, shown("sampled", limits=(("scale", 5.0),), **WAYS[0]))
+
+
+@pytest.mark.parametrize("limits", [{"max_depth": 2}, {"hide_emitters": True}], ids=["depth", "hidden"])
+def test_limits_of_depth_and_hidden_emitters_hold(limits):
+    one, other = (shown(name, limits=tuple(limits.items()), **WAYS[0]) for name in ("expected", "sampled"))
+    assert_same_picture(one, other)
+
+
+def test_it_is_taken_in_thin_media_under_a_sun():
+    thin, thick, dark = scene(scale=1.0), scene(scale=50.0), scene([SKY], scale=1.0)
+    found = [render(s, spp=1, technique="delta").metadata["background"] for s in (thin, thick, dark)]
+    assert found == ["expected", "sampled", "sampled"]
+    assert clvol.plan(thin, technique="regular").in_force["background"] == "none"
