@@ -7,14 +7,20 @@
 #ifndef CLVOL_STAGES_BACKGROUND_H
 #define CLVOL_STAGES_BACKGROUND_H
 #if CLVOL_EXPECTS_BACKGROUND
+#include "core/scene.h"
 #include "stages/escape.h"
 
 /* Of a walk in the scene's one medium, or a leg of it; `through`: its estimate of T. */
 INLINE void expect_background(const Scene *scene, uint slot, float through, bool gets_through)
 {
     const Spectrum inside = to_spectrum(load_vector(scene->media->background), (int)path_channel(scene, slot));
+#if CLVOL_HAS_CONSTANT || CLVOL_HAS_ENVMAP
+    const Spectrum behind = escape_light(scene, slot);
+#else
+    const Spectrum behind = (Spectrum)(0.0f);
+#endif
     const float chance = through - (gets_through ? 1.0f : 0.0f);
-    const Spectrum added = path_beta(scene, slot) * (escape_light(scene, slot) - inside) * chance;
+    const Spectrum added = path_beta(scene, slot) * (behind - inside) * chance;
     set_path_radiance(scene, slot, path_radiance(scene, slot) + added);
 }
 
