@@ -31,6 +31,7 @@ INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream
 
 #if CLVOL_LANES
 #define LANE_COLLIDES 1 /* walks end by real collisions */
+#define LANE_FLIES_ON 0
 
 INLINE Int lane_event(LaneState *state, Real density, Bits k, Int ready)
 {

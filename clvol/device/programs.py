@@ -20,6 +20,7 @@ from clvol.device.launch import GROUP, whole
 from clvol.device.preprocess import Preprocessor
 from clvol.device.side_builds import Launch, Unit
 from clvol.errors import DeviceError
+from clvol.planning.lanes import lanes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -92,7 +93,7 @@ def stage_source(plan: Plan, stage: str) -> str:
     if stage == "accumulate":
         return compose(plan, '#include "kernels/accumulate.cl"\n')
     text = f'#include "stages/{stage}.h"\n#include "kernels/stage.cl"\n'
-    return compose(plan, text, {"CLVOL_LANES": plan.lanes.get(stage, 0)}, stage=layout.stage(stage))
+    return compose(plan, text, {"CLVOL_LANES": lanes(plan).get(stage, 0)}, stage=layout.stage(stage))
 
 
 def light_cache_source(plan: Plan) -> str:

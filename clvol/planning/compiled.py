@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from clvol import layout
 from clvol.planning import registry
+from clvol.planning.lanes import lanes
 
 if TYPE_CHECKING:
     from clvol.planning.decisions import Decisions
@@ -18,7 +19,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_LOCAL_SIZE": plan.tuning.local_size,
         "CLVOL_GROUP_SLOTS": plan.tuning.group_slots,
         "CLVOL_LANES": 0,  # of units other than those of stages that walk in lanes
-        "CLVOL_HAS_LANES": max(plan.lanes.values(), default=0),
+        "CLVOL_HAS_LANES": max(lanes(plan).values(), default=0),
         "CLVOL_CHANNELS": plan.channels,
         "CLVOL_SPECTRUM": plan.spectrum,
         "CLVOL_EXTINCTION": plan.extinction,

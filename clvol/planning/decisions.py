@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, cast
 
 from clvol import layout
 from clvol.planning import registry
-from clvol.planning.lanes import lanes
 from clvol.planning.needs import MajorantNeeds
 from clvol.planning.settled import FAR_APART, Settled, Tuning
 
@@ -195,11 +194,6 @@ class Decisions:
             cast("ResidualControl", self.chosen["control"]) if residual else "none",
             self.choices.majorant_scale,
         )
-
-    @property
-    def lanes(self) -> dict[str, int]:
-        """Stages that walk their paths side by side, and how many at once."""
-        return lanes(self)
 
     @property
     def randomizations(self) -> int:

@@ -14,6 +14,7 @@ import pyopencl as cl
 from clvol import layout
 from clvol.accel.skipping import marked_empty
 from clvol.layout import BRICK_SAMPLES
+from clvol.planning.lanes import lanes
 from clvol.rendering.light_cache import light_cache_buffers
 from clvol.scene import records
 from clvol.tables.affine import rows_3x4
@@ -47,7 +48,7 @@ def upload_scene(device: Device, prepared: PreparedScene, render: np.ndarray) ->
     tables = (prepared.majorants[number] for number in prepared.matter.of_entry)
     majorants = [table for table in tables if table is not None]
     if "majorants" in needed:
-        bounds = [_bounds(m) if prepared.plan.lanes else m.majorant for m in majorants]
+        bounds = [_bounds(m) if lanes(prepared.plan) else m.majorant for m in majorants]
         buffers["majorants"] = _buffer(device, np.concatenate(bounds))
     if "majorant_links" in needed:
         buffers["majorant_links"] = _buffer(

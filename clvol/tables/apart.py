@@ -35,7 +35,9 @@ def depth_across(matter: Matter, volumes: Sequence[PreparedVolume]) -> float:
     From the extrema of cubes of 4³ cells, whose mean is nearer to the least: a guess, to decide what pays.
     Infinite where there is no such medium, or its volume is a tree.
     """
-    volume = volumes[matter.roles[0]["sigma_t"]] if len(matter.media) == 1 and matter.roles[0] else None
+    volume = None
+    if len(matter.media) == 1 and "sigma_t" in matter.roles[0]:
+        volume = volumes[matter.roles[0]["sigma_t"]]
     if volume is None or not isinstance(volume.bricks, BrickMap):
         return np.inf
     bricks = volume.bricks

@@ -114,6 +114,8 @@ def test_every_header_includes_what_it_uses(device, folder):
         if name.startswith(f"{folder}/"):
             text = f'#include "{name}"\n__kernel void nothing(void) {{}}\n'
             macros = {"CLVOL_LANES": 8} if "lane" in name else {}
+            if name in ("stages/background.h", "tracking/delta_through.h"):
+                macros["CLVOL_EXPECTS_BACKGROUND"] = 1
             unit = programs.compose(plan, text, macros, stage=contracts.get(name))
             assert f'"{name}"' in unit, f"{name} is empty"
             programs.build(device, unit, name)
@@ -131,9 +133,8 @@ def test_every_file_is_included_by_another_or_fills_a_slot():
     included = {name for text in TEXTS.values() for name in re.findall(r'#include "(.+)"', text)}
     chosen = {choice.header for family in registry.FAMILIES.values() for choice in family.values()}
     chosen |= {f"stages/{stage.name}.h" for stage in layout.STAGES}
-    assert set(HEADERS) - included - chosen == {"majorant/tree_grid.h"}, (
-        "that one, grids of sparse volumes take"
-    )
+    others = {"majorant/tree_grid.h", "tracking/delta_through.h"}
+    assert set(HEADERS) - included - chosen == others, "grids of sparse volumes, and background `expected`"
     assert included <= {*HEADERS, "kernels/lanes.cl"}
 
 

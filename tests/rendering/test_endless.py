@@ -15,6 +15,7 @@ from stat_tests import assert_same_picture
 
 import clvol
 from clvol.planning.choices import Choices
+from clvol.planning.lanes import lanes
 from clvol.rendering import wavefront
 from clvol.rendering.outcome import make_result
 from clvol.rendering.session import Session
@@ -98,7 +99,7 @@ def test_the_host_is_asked_after_a_bounded_number_of_steps(device, kind):
     with contextlib.suppress(KeyboardInterrupt):  # raised where no pass was finished
         session.run(0, 1 << 20, None, None, ask)
     items = runs.groups * plan.tuning.local_size
-    at_hand = max(plan.lanes.values(), default=1)
+    at_hand = max(lanes(plan).values(), default=1)
     assert 0 < most[0] <= 2 * items * (STAGE_STEPS + at_hand * WALK_STEPS)
     assert least.calls[0] < 30
 

@@ -9,6 +9,7 @@ from stat_tests import assert_same_picture, seed_of
 import clvol
 from clvol.planning.choices import Choices
 from clvol.planning.in_force import warnings
+from clvol.planning.lanes import lanes as stages_in_lanes
 from clvol.planning.plan import Plan
 from clvol.planning.settled import Tuning
 from clvol.scene.records import ConstantEmitter, DirectionalEmitter
@@ -128,13 +129,13 @@ BESIDE = box((2, 0, 0), (3, 1, 1), homogeneous(1.0, 0.9))
 )
 def test_a_plan_says_which_stages_walk_in_lanes_and_what_is_against_it(scene, choices, stages, said):
     plan = clvol.plan(scene, **choices)
-    assert plan.lanes == stages
+    assert stages_in_lanes(plan) == stages
     assert said in next(line for line in plan.describe() if line.startswith("  lanes"))
 
 
 def test_a_device_decides_where_nobody_else_does():
     plan = clvol.plan(cloud())
-    assert plan.chosen["lanes"] == "auto" and not plan.lanes
+    assert plan.chosen["lanes"] == "auto" and not stages_in_lanes(plan)
     assert plan.tune(Tuning(lanes=16)).chosen["lanes"] == "16"
     assert plan.tune(Tuning(64, 512)).chosen["lanes"] == "off"
     mixed = " ".join(str(clvol.plan(cloud(), technique="spectral", lanes="4")).split())
