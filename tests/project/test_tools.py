@@ -246,7 +246,7 @@ def test_what_cannot_be_measured_is_left_out_and_told(tool, monkeypatch: pytest.
 
     monkeypatch.setattr(bench, "mitsuba_here", unavailable)
     monkeypatch.setattr(bench.rays, "callback", lambda **_: (None, {"rays": kept}))
-    for command in (bench.startup, bench.load, bench.memory, bench.chromatic.main, bench.pool):
+    for command in (bench.scenes, bench.startup, bench.load, bench.memory, bench.chromatic.main, bench.pool):
         monkeypatch.setattr(command, "callback", lambda **_: (None, {}))
     outcome = CliRunner().invoke(bench.main, ["all"])
     assert outcome.exit_code == 1 and "at least 0.999" in outcome.output
