@@ -36,7 +36,7 @@ INLINE SegmentWalk segments_begin(const MediumRay *in, float t, float t_end)
     const float3 most = size - 1.0f - less;
     SegmentWalk walk;
     walk.start = d < 0.0f ? -p : p;
-    walk.inverse_d = 1.0f / (d < 0.0f ? -d : d);
+    walk.inverse_d = 1.0f / (float3)(abs_of(d.x), abs_of(d.y), abs_of(d.z)); /* of -0, too, infinite and positive */
     walk.last = d < 0.0f ? (float3)(0.0f) : most;
     const float3 first = d < 0.0f ? -most : (float3)(0.0f);
     walk.plane.x = max_of((float)floor_int(walk.start.x) + 1.0f, first.x);
