@@ -182,9 +182,9 @@ def test_masks_that_hold_nothing_are_noticed(monkeypatch):
 @pytest.mark.parametrize(
     ("old", "new", "view"),
     [
-        ("dot(ng, d) < 0.0f", "dot(ng, d) > 0.0f", {"fov": 16.0}),
+        ("dot_of(ng, d) < 0.0f", "dot_of(ng, d) > 0.0f", {"fov": 16.0}),
         ("inside->word[shape->boundary >> 5] |= bit", "(void)bit", {"fov": 16.0}),
-        ("dot(surface.ng, ray.d) > 0.0f", "dot(surface.ng, ray.d) < 0.0f", CAMERA_INSIDE),
+        ("dot_of(surface.ng, ray.d) > 0.0f", "dot_of(surface.ng, ray.d) < 0.0f", CAMERA_INSIDE),
     ],
     ids=["the wrong way round", "never inside", "the camera outside"],
 )
