@@ -4,7 +4,7 @@ import functools
 
 import numpy as np
 from fields import CHROMATIC, FIELDS, RAYS, exit_distance, optical_depth
-from probe import grid_volume, scene_of
+from probe import Probe, grid_volume, scene_of
 from stat_tests import chi2_p_value, require_samples, z_score
 
 from clvol.planning import registry
@@ -175,3 +175,13 @@ def assert_weighted_collisions(distances, weights, tau, length, bound, where):
 def unbiased(family):
     """Names of a family that walk volumes and claim to be unbiased."""
     return [name for name, choice in registry.FAMILIES[family].items() if choice.header and not choice.biased]
+
+
+def probes_of(device, **always):
+    """A function that returns the probe of a field and choices, made when first asked for."""
+
+    @functools.cache
+    def get(field, **choices):
+        return Probe(device, scene_with(field), **always, **choices)
+
+    return get

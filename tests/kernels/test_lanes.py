@@ -9,7 +9,7 @@ from lane_walks import lane_walks
 from probe import Probe, medium_of, scene_of
 from scipy import stats
 from stat_tests import FALSE_ALARM, largest_z, require_precision, sidak, z_score
-from walks import collision_p_value, exact_depth, scene_with
+from walks import collision_p_value, exact_depth, probes_of, scene_with
 
 from clvol.accel import costs
 from clvol.accel.skipping import marked_empty
@@ -29,16 +29,7 @@ TRANSMITTANCES = [name for name, choice in registry.TRANSMITTANCES.items() if ch
 
 @pytest.fixture(scope="module")
 def probes(device):
-    """Probes by field and choices, made when first asked for."""
-    made = {}
-
-    def get(field, **choices):
-        key = (field, *sorted(choices.items()))
-        if key not in made:
-            made[key] = Probe(device, scene_with(field), lanes="8", **choices)
-        return made[key]
-
-    return get
+    return probes_of(device, lanes="8")
 
 
 @pytest.mark.parametrize(("majorant", "lookup"), WALKED)

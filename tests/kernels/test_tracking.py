@@ -17,6 +17,7 @@ from walks import (
     assert_weighted_collisions,
     collision_p_value,
     exact_depth,
+    probes_of,
     sample_walks,
     scene_with,
     transmittance_walks,
@@ -50,16 +51,7 @@ def chromatic_combinations(family):
 
 @pytest.fixture(scope="module")
 def probes(device):
-    """Probes by field and choices, made when first asked for."""
-    made = {}
-
-    def get(field, **choices):
-        key = (field, *sorted(choices.items()))
-        if key not in made:
-            made[key] = Probe(device, scene_with(field), **choices)
-        return made[key]
-
-    return get
+    return probes_of(device)
 
 
 def choices_of(family, name, majorant, lookup):
@@ -105,6 +97,20 @@ def test_collisions_of_each_channel_follow_its_distribution(probes, technique, m
             own = weights[:, channel if together else 0]
             where = f"{field}, ray {name}, channel {channel}"
             assert_weighted_collisions(t, own, tau[channel], length, bound, where)
+
+
+@pytest.mark.parametrize("family", ["technique", "transmittance"])
+@pytest.mark.parametrize("majorant", registry.MAJORANTS)
+def test_minus_nothing_in_a_direction_is_nothing(probes, family, majorant):
+    """A direction along an axis has zeros of both signs; -1/0 must not be where a plane is crossed."""
+    walks = {"technique": sample_walks, "transmittance": transmittance_walks}[family]
+    for name in unbiased(family):
+        probe = probes("sparse", **choices_of(family, name, majorant, "exact"))
+        plus, minus = (
+            walks(probe, (np.array([0.997, 0.52, 0.48]), np.array([-1.0, zero, zero])), 0.99, 64)
+            for zero in (0.0, -0.0)
+        )
+        assert all(np.array_equal(a, b) for a, b in zip(plus, minus, strict=True)), name
 
 
 def assert_mean(values, exact, comparisons, where):

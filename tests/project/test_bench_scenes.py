@@ -2,35 +2,22 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import subprocess
 from contextlib import contextmanager
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from places import TOOLS
 
 import clvol
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
-
-
-@pytest.fixture
-def tool(monkeypatch: pytest.MonkeyPatch):
-    """Import a module of tools/ by name."""
-    monkeypatch.syspath_prepend(TOOLS)
-
-    def load(name: str) -> ModuleType:
-        return importlib.import_module(name)
-
-    return load
 
 
 # --- scenes ----------------------------------------------------------------------------------------

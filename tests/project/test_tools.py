@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 import re
 import runpy
 import subprocess
 import sys
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -29,17 +28,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 CLOUD = str(SCENES / "cloud.xml")
-
-
-@pytest.fixture
-def tool(monkeypatch: pytest.MonkeyPatch):
-    """Import a module of tools/ by name."""
-    monkeypatch.syspath_prepend(TOOLS)
-
-    def load(name: str) -> ModuleType:
-        return importlib.import_module(name)
-
-    return load
 
 
 COMMANDS = sorted(path.name for path in TOOLS.glob("*.py") if "__main__" in path.read_text(encoding="utf-8"))
