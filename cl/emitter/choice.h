@@ -34,10 +34,11 @@ INLINE uint choose_by_table(const Scene *scene, float *pick)
 }
 
 #if CLVOL_LIGHT_CHOICE
-#define TABLE_SHARE \
-    0.25f /* of choices that go by the table; 1 over it is exact, and keeps the fineness of small numbers */
+/* Of choices that go by the table.  A power of two keeps the fineness of small numbers. */
+#define TABLE_SHARE 0.25f
 
-#define UNIFORM_SKY_NEED 0.1f /* scattering finds it as well */
+/* How much a uniform sky needs sampling, which scattering finds as well. */
+#define UNIFORM_SKY_NEED 0.1f
 
 /* What a light is expected to bring to p.  A sky is found by scattering as well, and needs sampling less. */
 INLINE float expected_light(const Scene *scene, uint light, float3 p)
