@@ -6,6 +6,7 @@ picture.  clvol_worker.py, mitsuba_worker.py and cycles_worker.py answer them.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import subprocess
@@ -84,7 +85,8 @@ class Worker:
 
     def close(self) -> None:
         """End the program."""
-        self._process.stdin.close()
+        with contextlib.suppress(BrokenPipeError):  # what a program that has ended did not take
+            self._process.stdin.close()
         self._process.wait()
         self._process.stdout.close()
         self._folder.cleanup()
