@@ -13,7 +13,7 @@ INLINE uint4 decision_block(const Scene *scene, SampleKey key, uint block, uint 
 }
 
 #if CLVOL_LANES
-INLINE BitsBlock lane_decisions(const Scene *scene, const LaneKeys *keys, uint block, Bits segment)
+INLINE BitsBlock lane_decisions(const Scene *scene, const LaneKeys *keys, Bits block, Bits segment)
 {
     const BitsBlock counter = {keys->pixel, keys->sample, keys->bounce * 8u + block, segment};
     return philox_lanes(counter, (uint2)(scene->render->seed[0], scene->render->seed[1]));

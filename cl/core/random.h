@@ -91,6 +91,13 @@ INLINE uint2 stream_pair(Stream *stream)
 
 DEFINE_MINUS_LOG(minus_log, float)
 
+/* -ln(x) of a normal number, whose bits are `bits`. */
+INLINE float minus_log_of_bits(uint bits)
+{
+    const uint shifted = bits - 0x3F3504F3u; /* mantissa into [sqrt_of(1/2), sqrt_of(2)) */
+    return minus_log(as_float((shifted & 0x007FFFFFu) + 0x3F3504F3u) - 1.0f, (float)((int)shifted >> 23));
+}
+
 /* Exponential variate with mean 1 from a full 32-bit number: -ln(1 - (k+1/2)/2^32), with full relative
    precision at both ends (METHODS §7).  Near 1 the argument of the logarithm is kept as its distance
    from 1. */

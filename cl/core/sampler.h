@@ -2,7 +2,7 @@
 
        uint4 decision_block(scene, key, block, segment);
 
-   and, of stages that walk in lanes, lane_decisions(scene, &keys, block, segment) for blocks of walks:
+   and, of stages whose paths go in lanes, lane_decisions(scene, &keys, block, segment):
    four numbered dimensions, full 32-bit, for a BLOCK_* of core/random.h; `segment` tells apart the walks of one
    bounce. */
 #ifndef CLVOL_CORE_SAMPLER_H

@@ -86,8 +86,8 @@ INLINE uint4 decision_block(const Scene *scene, SampleKey key, uint block, uint 
 }
 
 #if CLVOL_LANES
-/* As decision_block, in lanes; for walks, whose blocks keep the order of their numbers. */
-INLINE BitsBlock lane_decisions(const Scene *scene, const LaneKeys *keys, uint block, Bits segment)
+/* As decision_block, in lanes. */
+INLINE BitsBlock lane_decisions(const Scene *scene, const LaneKeys *keys, Bits block, Bits segment)
 {
     const uint2 seed = (uint2)(scene->render->seed[0], scene->render->seed[1]);
     const Bits part = keys->sample % CLVOL_RANDOMIZATIONS, index = keys->sample / CLVOL_RANDOMIZATIONS;
@@ -108,6 +108,11 @@ INLINE BitsBlock lane_decisions(const Scene *scene, const LaneKeys *keys, uint b
         point.z ^= gather_bits(digits + 2, at);
         point.w ^= gather_bits(digits + 3, at);
     }
+    const Int turned = MASK(block == BLOCK_LIGHT) | MASK(block == BLOCK_SURFACE);
+    const BitsBlock as_drawn = point;
+    point.x = turned ? as_drawn.z : as_drawn.x;
+    point.y = turned ? as_drawn.x : as_drawn.y;
+    point.z = turned ? as_drawn.y : as_drawn.z;
     BitsBlock scramble = {keys->pixel, randomization, number, segment};
     scramble = philox_lanes(scramble, seed);
     point.x = reverse_lanes(owen_scramble_lanes(point.x, scramble.x));

@@ -19,11 +19,6 @@ typedef struct {
     Int channel;
 } LaneRays;
 
-#define set_lane(vector, lane, value) (((float *)&(vector))[lane] = (value))
-#define set_lane_int(vector, lane, value) (((int *)&(vector))[lane] = (value))
-#define lane_of(vector, lane) (((const float *)&(vector))[lane])
-#define lane_int(vector, lane) (((const int *)&(vector))[lane])
-
 INLINE void set_lane_axis(Real *o, Real *d, Real *inverse, uint lane, float origin, float direction)
 {
     const float way = abs_of(direction) > LEAST_DIRECTION ? direction : LEAST_DIRECTION;
@@ -46,7 +41,7 @@ INLINE void lane_put(LaneRays *rays, LaneState *state, uint lane, const LaneWalk
     set_lane(state->t, lane, 0.0f);
     set_lane(state->t_end, lane, 0.0f); /* the first cell is still to be entered */
     set_lane(state->bound, lane, 0.0f);
-    set_lane(state->depth, lane, exponential_variate(walk->k.x) * per_depth);
+    set_lane(state->depth, lane, walk->depth * per_depth);
     set_lane(state->estimate, lane, 1.0f);
     set_lane_int(state->stream.counter, lane, (int)walk->k.z);
     set_lane_int(state->stream.key, lane, (int)walk->k.w);
@@ -118,12 +113,13 @@ typedef struct {
 
 typedef struct {
     uint x[OWN_PATHS + CLVOL_LANES], y[OWN_PATHS + CLVOL_LANES], z[OWN_PATHS + CLVOL_LANES], w[OWN_PATHS + CLVOL_LANES];
+    uint depth[OWN_PATHS + CLVOL_LANES]; /* exponential variate of x, a float's bits */
 } LaneBlocks;
 
 INLINE void store_bits(uint *to, Bits values)
 {
     for (uint lane = 0; lane < CLVOL_LANES; ++lane)
-        to[lane] = (uint)lane_int(values, lane);
+        to[lane] = lane_uint(values, lane);
 }
 
 /* The random numbers of all walks at hand, which by the way of vectors cost a fraction. */
@@ -137,12 +133,13 @@ INLINE void lane_blocks(const Scene *scene, __global const uint *slots, uint fir
         for (uint lane = 0; lane < CLVOL_LANES && i < count; ++lane, i += stride) {
             uint segment;
             const SampleKey key = lane_key(scene, slots[i], &segment);
-            set_lane_int(keys.pixel, lane, (int)key.pixel);
-            set_lane_int(keys.sample, lane, (int)key.sample);
-            set_lane_int(keys.bounce, lane, (int)key.bounce);
-            set_lane_int(segments, lane, (int)segment);
+            set_lane_uint(keys.pixel, lane, key.pixel);
+            set_lane_uint(keys.sample, lane, key.sample);
+            set_lane_uint(keys.bounce, lane, key.bounce);
+            set_lane_uint(segments, lane, segment);
         }
-        const BitsBlock block = lane_decisions(scene, &keys, LANE_BLOCK, segments);
+        const BitsBlock block = lane_decisions(scene, &keys, (Bits)(LANE_BLOCK), segments);
+        store_bits(blocks->depth + n, real_bits(lane_exponential(block.x)));
         store_bits(blocks->x + n, block.x);
         store_bits(blocks->y + n, block.y);
         store_bits(blocks->z + n, block.z);
@@ -186,6 +183,7 @@ INLINE LanesWalked walk_lanes(const Scene *scene, uint group, __global const uin
                     const uint slot = slots[walked.next];
                     walked.next += stride;
                     walk.k = (uint4)(blocks.x[own], blocks.y[own], blocks.z[own], blocks.w[own]);
+                    walk.depth = as_float(blocks.depth[own]);
                     ++own;
                     if (!lane_begin(scene, group, slot, &walk))
                         continue;

@@ -3,7 +3,6 @@
 #ifndef CLVOL_STAGES_COLLISION_SCATTER_H
 #define CLVOL_STAGES_COLLISION_SCATTER_H
 #if CLVOL_HAS_MEDIA
-#include "core/sampler.h"
 #include "emitter/emitter.h"
 #if CLVOL_EMISSION_AT_COLLISIONS
 #include "medium/emission.h"
@@ -16,7 +15,7 @@
 #include "stages/bounce.h"
 #include "stages/direction_control.h"
 #endif
-#include "path/key.h"
+#include "path/draws.h"
 #include "path/ray.h"
 #include "path/reset.h"
 #include "path/weight.h"
@@ -24,17 +23,17 @@
 #include "tracking/probability.h"
 
 /* Weight of a path below which absorption is sampled (absorption "mixed").  On cloud.xml, with
-   next-event estimation, 1/2 was 1.4 times as efficient as never sampling it and 1.9 times as always.  Where flights
+   next-event estimation, 1/2 was 1.4 times as efficient as never sampling it and 1.9 times as always; 0.3 is 1.02 to
+   1.07 times as efficient as 1/2 on clouds under a sky, grey or not, and smoke in a room.  Where flights
    gather emission at strata, what a dark medium scatters is most of the noise: with an albedo of 0.3, 1/10 was 1.4
    times as efficient as 1/4, and 1.1 times as never. */
-#define MIXED_WEIGHT (CLVOL_FLIGHT_STRATA > 1 ? 0.1f : 0.5f)
+#define MIXED_WEIGHT (CLVOL_FLIGHT_STRATA > 1 ? 0.1f : 0.3f)
 
 #if CLVOL_HAS_SCATTERING
 /* Absorption at a collision (METHODS §2): by event, by weight, or by weight as long as the path's weight
    is worth following and by event below.  Each multiplies the expected weight by the albedo.  By event, a path
    of several channels chooses between scattering and absorption as it does between events of its walk. */
-INLINE bool survives_absorption(const Scene *scene, uint slot, SampleKey key, uint walk, Spectrum albedo,
-                                Spectrum *beta)
+INLINE bool survives_absorption(const Scene *scene, uint slot, const Draws *draws, Spectrum albedo, Spectrum *beta)
 {
     float survival = 1.0f;
     if (CLVOL_ABSORPTION == ABSORPTION_SAMPLE) {
@@ -56,8 +55,7 @@ INLINE bool survives_absorption(const Scene *scene, uint slot, SampleKey key, ui
             survival = weight > 0.0f ? 1.0f : 0.0f;
     }
     if (survival < 1.0f) {
-        const uint4 k = decision_block(scene, key, BLOCK_WALK, walk);
-        if (!choose_event(k.y, survival, 1.0f - survival))
+        if (!choose_event(drawn_block(scene, draws, BLOCK_WALK).y, survival, 1.0f - survival))
             return false;
         if (CLVOL_ABSORPTION == ABSORPTION_MIXED)
             *beta *= 1.0f / survival;
@@ -66,13 +64,13 @@ INLINE bool survives_absorption(const Scene *scene, uint slot, SampleKey key, ui
 }
 
 /* Next-event estimation: whether it made a shadow ray, towards one light. */
-INLINE bool next_event(const Scene *scene, uint slot, SampleKey key, __global const Medium *medium, float3 p, float3 wo,
-                       float3 wi, Spectrum beta)
+INLINE bool next_event(const Scene *scene, uint slot, const Draws *draws, __global const Medium *medium, float3 p,
+                       float3 wo, float3 wi, Spectrum beta)
 {
 #if CLVOL_NEE
     if (!medium->sample_emitters)
         return false;
-    const uint4 k = decision_block(scene, key, BLOCK_LIGHT, 0);
+    const uint4 k = drawn_block(scene, draws, BLOCK_LIGHT);
     const LightSample light = sample_light(scene, p, uniform_below_one(k.x), uniform_below_one(k.y),
                                            uniform_below_one(k.z));
     const float pdf = phase_pdf(scene, medium, wo, light.direction);
@@ -84,7 +82,7 @@ INLINE bool next_event(const Scene *scene, uint slot, SampleKey key, __global co
 #if CLVOL_LIGHT_CACHE
     const float transmittance = cached_transmittance(scene, light.number, p, light.direction, light.distance);
 #if CLVOL_DIRECTION_CONTROL
-    if (!(light.pdf > 0.0f) && !(CLVOL_HAS_MAX_DEPTH && key.bounce + 1 >= scene->render->max_depth)) {
+    if (!(light.pdf > 0.0f) && !(CLVOL_HAS_MAX_DEPTH && draws->key.bounce + 2 >= scene->render->max_depth)) {
         const Spectrum added = unoccluded * direction_control(scene, medium, transmittance, wo, wi, light.direction);
         set_path_radiance(scene, slot, path_radiance(scene, slot) + added);
     }
@@ -101,21 +99,21 @@ INLINE bool next_event(const Scene *scene, uint slot, SampleKey key, __global co
 }
 
 /* The path goes on from p; returns false when it ends there. */
-INLINE bool scatter(const Scene *scene, uint slot, SampleKey key, __global const Medium *medium, Spectrum beta,
+INLINE bool scatter(const Scene *scene, uint slot, const Draws *draws, __global const Medium *medium, Spectrum beta,
                     bool *shadow_ray)
 {
-    key.bounce += 1;
-    if (depth_is_reached(scene, slot, key.bounce, beta))
+    const uint bounce = draws->key.bounce + 1;
+    if (depth_is_reached(scene, slot, bounce, beta))
         return false;
-    set_path_bounce(scene, slot, key.bounce); /* also numbers the shadow ray's random numbers */
+    set_path_bounce(scene, slot, bounce); /* also numbers the shadow ray's random numbers */
     const Ray ray = path_ray(scene, slot);
-    const uint4 k = decision_block(scene, key, BLOCK_DIRECTION, 0);
+    const uint4 k = drawn_block(scene, draws, BLOCK_DIRECTION);
     float pdf;
     const float3 wi = phase_sample(scene, medium, ray.d, uniform_below_one(k.x), uniform_below_one(k.y),
                                    uniform_float(k.w), &pdf);
-    *shadow_ray = next_event(scene, slot, key, medium, ray.o, ray.d, wi, beta);
+    *shadow_ray = next_event(scene, slot, draws, medium, ray.o, ray.d, wi, beta);
     const float weight = spectrum_max(beta) * path_eta_squared(scene, slot);
-    const float survival = roulette_survival(scene, key.bounce, weight, false);
+    const float survival = roulette_survival(scene, bounce, weight, false);
     if (survival < 1.0f && !survives_roulette(k.z, survival, &beta))
         return false;
     set_path_pdf(scene, slot, medium->sample_emitters ? pdf : 0.0f);
@@ -128,11 +126,9 @@ INLINE bool scatter(const Scene *scene, uint slot, SampleKey key, __global const
 #endif
 
 /* Returns false when the path ends at the collision; `shadow_ray`: whether it made one. */
-INLINE bool shade_collision(const Scene *scene, uint slot, bool *shadow_ray)
+INLINE bool shade_collision(const Scene *scene, uint slot, const Draws *draws, bool *shadow_ray)
 {
-    const int number = path_medium(scene, slot);
-    __global const Medium *medium = scene->media + number;
-    const uint walk = path_segment(scene, slot) * scene->render->media + (uint)number;
+    __global const Medium *medium = scene->media + path_medium(scene, slot);
     const float3 p = path_ray(scene, slot).o;
     const int channel = (int)path_channel(scene, slot);
     Spectrum beta = path_beta(scene, slot);
@@ -144,10 +140,9 @@ INLINE bool shade_collision(const Scene *scene, uint slot, bool *shadow_ray)
     first_collision(scene, slot, p, medium_albedo(scene, medium, p, channel));
 #endif
 #if CLVOL_HAS_SCATTERING
-    const SampleKey key = path_key(scene, slot);
-    if (!survives_absorption(scene, slot, key, walk, medium_albedo(scene, medium, p, channel), &beta))
+    if (!survives_absorption(scene, slot, draws, medium_albedo(scene, medium, p, channel), &beta))
         return false;
-    return scatter(scene, slot, key, medium, beta, shadow_ray);
+    return scatter(scene, slot, draws, medium, beta, shadow_ray);
 #else
     return false;
 #endif

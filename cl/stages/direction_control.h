@@ -13,6 +13,7 @@
 #ifndef CLVOL_STAGES_DIRECTION_CONTROL_H
 #define CLVOL_STAGES_DIRECTION_CONTROL_H
 #if CLVOL_DIRECTION_CONTROL
+#include "core/random.h"
 #include "core/scene.h"
 #include "phase/convolution.h"
 
@@ -24,8 +25,9 @@ INLINE float direction_control(const Scene *scene, __global const Medium *medium
 {
     const float g = mean_cosine(scene, medium);
     float order = clamp_to(transmittance, 1e-9f, 1.0f); /* a number whatever the cache holds */
-    const float tau = -log(order);
+    const float tau = minus_log_of_bits(as_uint(order));
     float sum = 0.0f, lobe = g;
+#pragma unroll
     for (int m = 1; m <= CONTROL_ORDERS; ++m, lobe *= g) {
         order *= tau / (float)m;
         sum += order * (phase_convolved(scene, medium, lobe, wo, to_light) - hg_value(lobe, wi, to_light));

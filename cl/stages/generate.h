@@ -1,9 +1,13 @@
 /* Writes a finished path's result at its job's own index and starts the next job in its slot. */
 #ifndef CLVOL_STAGES_GENERATE_H
 #define CLVOL_STAGES_GENERATE_H
-#include "core/sampler.h"
+#include "path/draws.h"
 #include "path/reset.h"
 #include "path/transitions.h"
+
+#define DRAWS_OWN 1
+#define DRAWS_DIRECTION 0
+#define DRAWS_LIGHT 0
 
 /* A job is one sample of one pixel, or, where a path follows one channel, a third of it; consecutive jobs are
    channels of a sample and samples of a pixel, so that rays that run together stay together. */
@@ -81,7 +85,8 @@ INLINE void set_camera_ray(const Scene *scene, uint slot, float x, float y, floa
     set_path_direction(scene, slot, unit_of(towards));
 }
 
-INLINE void start_job(const Scene *scene, uint slot, uint job)
+/* Which numbers the path of a job reads. */
+INLINE SampleKey job_key(const Scene *scene, uint job)
 {
     __global const Render *render = scene->render;
     const uint pass = job / render->pass_jobs;
@@ -96,12 +101,19 @@ INLINE void start_job(const Scene *scene, uint slot, uint job)
     key.sample += entry.y;
 #endif
     key.bounce = 0;
-    const uint4 k = decision_block(scene, key, BLOCK_CAMERA, 0);
-    const int width = render->film_size[0];
+    return key;
+}
+
+/* The path of a job begins: its ray, and nothing gathered yet. */
+INLINE void start_job(const Scene *scene, uint slot, uint job, const Draws *draws)
+{
+    const SampleKey key = draws->key;
+    const uint4 k = drawn_block(scene, draws, BLOCK_CAMERA);
+    const int width = scene->render->film_size[0];
     const int px = (int)(key.pixel % (uint)width), py = (int)(key.pixel / (uint)width);
     float weight = 1.0f;
     const float x = (float)px + filter_offset(scene, k.x, px, width, &weight);
-    const float y = (float)py + filter_offset(scene, k.y, py, render->film_size[1], &weight);
+    const float y = (float)py + filter_offset(scene, k.y, py, scene->render->film_size[1], &weight);
     set_camera_ray(scene, slot, x, y, uniform_float(k.z), uniform_float(k.w));
     set_path_sample_weight(scene, slot, weight);
     set_path_channel(scene, slot, job % CLVOL_JOBS_PER_SAMPLE);
@@ -109,7 +121,6 @@ INLINE void start_job(const Scene *scene, uint slot, uint job)
     set_path_radiance(scene, slot, (Spectrum)(0.0f));
     set_path_pixel(scene, slot, key.pixel);
     set_path_sample(scene, slot, key.sample);
-    set_path_job(scene, slot, job);
     set_path_bounce(scene, slot, 0);
     reset_counts(scene, slot);
     set_path_pdf(scene, slot, 0.0f);
@@ -121,30 +132,42 @@ INLINE void start_job(const Scene *scene, uint slot, uint job)
     reset_path(scene, slot);
 }
 
-/* Takes the next job for `slot` if there is one.  The counter is looked at before it is touched, so that
-   idle slots do not fight over it at the end of a render. */
-INLINE bool take_job(const Scene *scene, uint group, uint slot)
+/* The next job, or NO_JOB.  The counter is looked at before it is touched, so that idle slots do not fight over it at
+   the end of a render. */
+INLINE uint take_job(const Scene *scene)
 {
     const uint limit = scene->counters[COUNTER_JOB_LIMIT];
     if (scene->counters[COUNTER_NEXT_JOB] >= limit)
-        return false;
+        return NO_JOB;
     const uint job = atomic_inc(scene->counters + COUNTER_NEXT_JOB);
-    if (job >= limit) {
-        atomic_dec(scene->counters + COUNTER_NEXT_JOB);
+    if (job < limit)
+        return job;
+    atomic_dec(scene->counters + COUNTER_NEXT_JOB);
+    return NO_JOB;
+}
+
+/* A finished path writes its result; the slot takes the next job, whose camera ray will be drawn, or is left idle. */
+INLINE bool generate_begins(const Scene *scene, uint group, uint slot, Draws *draws)
+{
+    const uint finished = path_job(scene, slot);
+    if (finished != NO_JOB)
+        write_result(scene, slot, finished);
+    const uint job = take_job(scene);
+    set_path_job(scene, slot, job);
+    if (job == NO_JOB) {
+        to_idle(scene, group, slot);
         return false;
     }
-    start_job(scene, slot, job);
-    to_intersect(scene, group, slot);
+    draws->key = job_key(scene, job);
+    draws->block = BLOCK_CAMERA;
+    draws->segment = 0;
     return true;
 }
 
-/* A finished path: writes its result and starts the next one, or leaves the slot idle. */
-INLINE void generate(const Scene *scene, uint group, uint slot)
+INLINE void generate(const Scene *scene, uint group, uint slot, const Draws *draws)
 {
-    write_result(scene, slot, path_job(scene, slot));
-    set_path_job(scene, slot, NO_JOB);
-    if (!take_job(scene, group, slot))
-        to_idle(scene, group, slot);
+    start_job(scene, slot, path_job(scene, slot), draws);
+    to_intersect(scene, group, slot);
 }
 
 /* Slots left idle earlier, now that the limit may have risen. */
@@ -154,8 +177,10 @@ INLINE void wake_idle(const Scene *scene, uint group)
         return;
     for (uint i = get_local_id(0); i < CLVOL_GROUP_SLOTS; i += CLVOL_LOCAL_SIZE) {
         const uint slot = group * CLVOL_GROUP_SLOTS + i;
-        if (path_job(scene, slot) == NO_JOB && take_job(scene, group, slot))
+        if (path_job(scene, slot) == NO_JOB) {
             group_atomic_add(idle_slots(scene, group), -1u);
+            from_idle(scene, group, slot);
+        }
     }
 }
 

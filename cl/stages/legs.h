@@ -4,9 +4,21 @@
 #if CLVOL_HAS_MEDIA
 #include "core/random.h"
 #include "tracking/interface.h"
+#include "tracking/lanes.h"
 
 /* The random numbers of a leg: those of the walk's block, and for later ones what they key. */
 INLINE uint4 leg_block(uint4 block, uint leg) { return leg == 0 ? block : philox4x32(block, (uint2)(leg, 0)); }
+
+#if CLVOL_LANES
+/* The same of a walk in lanes, which holds its block's numbers. */
+INLINE void lane_leg(LaneWalk *walk, uint leg)
+{
+    if (leg == 0)
+        return;
+    walk->k = leg_block(walk->k, leg);
+    walk->depth = exponential_variate(walk->k.x);
+}
+#endif
 
 /* Where a walk stands on its ray.  Legs may be shorter than what rounding takes from their sum, so that is kept. */
 typedef struct {

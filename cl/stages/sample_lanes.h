@@ -40,7 +40,7 @@ INLINE bool lane_begin(const Scene *scene, uint group, uint slot, LaneWalk *walk
     walk->from = walked.t;
     walk->in = rest_of_ray(medium_ray(scene, scene->media, ray, path_medium_end(scene, slot), channel), walked.t);
 #endif
-    walk->k = leg_block(walk->k, walked.leg);
+    lane_leg(walk, walked.leg);
     return true;
 }
 

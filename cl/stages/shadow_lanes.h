@@ -38,7 +38,7 @@ INLINE bool lane_begin(const Scene *scene, uint group, uint slot, LaneWalk *walk
     }
     ray.o = span_point(&span, ray);
     walk->in = segment_ray(scene, &inside, 0, ray, span.end - span.start, (int)path_channel(scene, slot));
-    walk->k = leg_block(walk->k, walked.leg);
+    lane_leg(walk, walked.leg);
     walk->from = span_t(&span);
     return true;
 }

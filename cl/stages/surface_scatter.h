@@ -4,11 +4,10 @@
 #define CLVOL_STAGES_SURFACE_SCATTER_H
 #if CLVOL_HAS_SURFACES
 #include "bsdf/bsdf.h"
-#include "core/sampler.h"
 #include "emitter/area.h"
 #include "emitter/emitter.h"
 #include "geometry/surface.h"
-#include "path/key.h"
+#include "path/draws.h"
 #include "path/ray.h"
 #include "path/reset.h"
 #include "stages/bounce.h"
@@ -65,13 +64,13 @@ INLINE void gather_lamp(const Scene *scene, uint slot, Ray ray, const Hit *hit, 
 #endif
 
 /* Next-event estimation from a surface: whether it made a shadow ray, towards one light. */
-INLINE bool surface_next_event(const Scene *scene, uint slot, SampleKey key, const Surface *surface, const Side *side,
-                               float3 wi, Spectrum beta)
+INLINE bool surface_next_event(const Scene *scene, uint slot, const Draws *draws, const Surface *surface,
+                               const Side *side, float3 wi, Spectrum beta)
 {
 #if CLVOL_NEE
     if (material_is_smooth(side->material))
         return false;
-    const uint4 k = decision_block(scene, key, BLOCK_LIGHT, 0);
+    const uint4 k = drawn_block(scene, draws, BLOCK_LIGHT);
     LightSample light = sample_light(scene, surface->p, uniform_below_one(k.x), uniform_below_one(k.y),
                                      uniform_below_one(k.z));
     float pdf;
@@ -100,16 +99,16 @@ INLINE bool surface_next_event(const Scene *scene, uint slot, SampleKey key, con
 }
 
 /* The path goes on along the sampled direction; false where roulette ends it. */
-INLINE bool leave_surface(const Scene *scene, uint slot, SampleKey key, const Surface *surface, float3 d, float pdf,
-                          float eta, Spectrum beta)
+INLINE bool leave_surface(const Scene *scene, uint slot, const Draws *draws, const Surface *surface, float3 d,
+                          float pdf, float eta, Spectrum beta)
 {
     const float eta_squared = CLVOL_HAS_TRANSMISSION ? path_eta_squared(scene, slot) * eta * eta : 1.0f;
     set_path_eta_squared(scene, slot, eta_squared);
     const float weight = spectrum_max(beta) * eta_squared;
     if (weight == 0.0f) /* not so for NaN, which is to be seen */
         return false;
-    const float survival = roulette_survival(scene, key.bounce, weight, true);
-    if (survival < 1.0f && !survives_roulette(decision_block(scene, key, BLOCK_DIRECTION, 0).z, survival, &beta))
+    const float survival = roulette_survival(scene, draws->key.bounce + 1, weight, true);
+    if (survival < 1.0f && !survives_roulette(drawn_block(scene, draws, BLOCK_DIRECTION).z, survival, &beta))
         return false;
     Inside inside = path_inside(scene, slot);
     cross_boundary(scene->shapes + surface->shape, surface->ng, d, &inside);
@@ -123,7 +122,7 @@ INLINE bool leave_surface(const Scene *scene, uint slot, SampleKey key, const Su
 }
 
 /* Returns false when the path ends at the surface; `shadow_ray`: whether it made one. */
-INLINE bool shade_surface(const Scene *scene, uint slot, bool *shadow_ray)
+INLINE bool shade_surface(const Scene *scene, uint slot, const Draws *draws, bool *shadow_ray)
 {
     const Ray ray = path_ray(scene, slot);
     const Hit hit = path_hit(scene, slot);
@@ -138,11 +137,10 @@ INLINE bool shade_surface(const Scene *scene, uint slot, bool *shadow_ray)
         gather_lamp(scene, slot, ray, &hit, &surface);
 #endif
     const float3 wi = to_local(&surface, -ray.d);
-    SampleKey key = path_key(scene, slot);
     Side side;
     if (!side_of(scene, shape, wi, &side))
         return false;
-    const uint4 k = decision_block(scene, key, BLOCK_SURFACE, path_segment(scene, slot));
+    const uint4 k = drawn_block(scene, draws, BLOCK_SURFACE);
 #if CLVOL_HAS_PASSABLE
     if (side.material->kind == MATERIAL_NULL)
         return pass_on(scene, slot, ray, &hit, &surface);
@@ -165,15 +163,15 @@ INLINE bool shade_surface(const Scene *scene, uint slot, bool *shadow_ray)
 #if CLVOL_FIRST_HIT
     first_surface(scene, slot, &surface, side.material);
 #endif
-    key.bounce += 1;
-    if (depth_is_reached(scene, slot, key.bounce, beta))
+    const uint bounce = draws->key.bounce + 1;
+    if (depth_is_reached(scene, slot, bounce, beta))
         return false;
-    set_path_bounce(scene, slot, key.bounce); /* also numbers the shadow ray's random numbers */
-    *shadow_ray = surface_next_event(scene, slot, key, &surface, &side, wi, beta);
+    set_path_bounce(scene, slot, bounce); /* also numbers the shadow ray's random numbers */
+    *shadow_ray = surface_next_event(scene, slot, draws, &surface, &side, wi, beta);
     if (!sampled)
         return false;
     const float3 d = unit_of(to_world(&surface, on_side(&side, sample.direction)));
-    return leave_surface(scene, slot, key, &surface, d, sample.pdf, sample.eta, beta * sample.weight);
+    return leave_surface(scene, slot, draws, &surface, d, sample.pdf, sample.eta, beta * sample.weight);
 #else
     return false;
 #endif

@@ -17,6 +17,7 @@
 typedef struct {
     MediumRay in;
     uint4 k; /* the first distance, -, the stream's seed (2) */
+    float depth; /* the optical depth that the first distance stands for */
     float from;
 } LaneWalk;
 

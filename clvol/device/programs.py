@@ -20,7 +20,7 @@ from clvol.device.launch import GROUP, whole
 from clvol.device.preprocess import Preprocessor
 from clvol.device.side_builds import Launch, Unit
 from clvol.errors import DeviceError
-from clvol.planning.lanes import lanes
+from clvol.planning.lanes import widths
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -92,8 +92,11 @@ def stage_source(plan: Plan, stage: str) -> str:
     """The composed source of one stage kernel, or of `accumulate`."""
     if stage == "accumulate":
         return compose(plan, '#include "kernels/accumulate.cl"\n')
-    text = f'#include "stages/{stage}.h"\n#include "kernels/stage.cl"\n'
-    return compose(plan, text, {"CLVOL_LANES": lanes(plan).get(stage, 0)}, stage=layout.stage(stage))
+    contract, width = layout.stage(stage), widths(plan).get(stage, 0)
+    handling = "packets" if contract.begins else "in_lanes" if width else "one_by_one"
+    files = f"stages/{stage}.h", f"kernels/{handling}.cl", "kernels/stage.cl"
+    text = "".join(f'#include "{file}"\n' for file in files)
+    return compose(plan, text, {"CLVOL_LANES": width}, stage=contract)
 
 
 def light_cache_source(plan: Plan) -> str:

@@ -17,6 +17,12 @@ if TYPE_CHECKING:
     from clvol.layout.stages import Stage, Transition
 
 _SLOT = "const Scene *scene, uint group, uint slot"
+_FROM_IDLE = """\
+/* jobs are left for an idle slot */
+INLINE void from_idle({slot})
+{{
+    queue_push(scene, group, QUEUE_{queue}, slot);
+}}"""
 
 
 def stage_text(macros: Macros, stage: Stage) -> str:
@@ -32,9 +38,13 @@ def stage_text(macros: Macros, stage: Stage) -> str:
     ]
     if stage.wakes:
         lines.append(f"#define STAGE_WAKES {stage.wakes}")
+    if stage.begins:
+        lines.append(f"#define STAGE_BEGINS {stage.begins}")
     if stage.stands_by:
         lines.append(f"#define STAGE_STANDS_BY EVENT_{stage.stands_by}")
     values = path_values(macros)
+    if stage.wakes:
+        lines.append(_FROM_IDLE.format(slot=_SLOT, queue=stage.empties))
     return "\n".join([*lines, *(_transition_text(t, values) for t in stage.transitions)]) + "\n"
 
 

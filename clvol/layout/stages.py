@@ -91,7 +91,10 @@ class Stage:
     transitions : every way in which it hands a path on.
     reads, writes : values of `PATH_STATE`.  Those that transitions set are not repeated.
     needs : a macro that must be other than 0 for it to be launched.
-    wakes : function that the group calls before its loop, for slots that are in no queue.
+    wakes : function that the group calls before its loop, which may put slots that are in no queue into the
+        stage's own, by ``from_idle(scene, group, slot)``.
+    begins : function that is called with every path first.  It hands the path on and returns false, or says
+        which random numbers the stage will draw for it, so that they can be drawn in lanes.
     stands_by : event that brings a path back in the next wave, of stages whose walks may take long: a
         work-item that has taken its share of steps hands its other paths on with this event.  The stage's
         function returns the steps that it took.
@@ -105,6 +108,7 @@ class Stage:
     writes: frozenset[str]
     needs: str = ""
     wakes: str = ""
+    begins: str = ""
     stands_by: str = ""
 
     @property
@@ -157,6 +161,7 @@ STAGES = (
             "job beta radiance sample_weight channel pdf inside eta_squared largest_weight",
         ),
         wakes="wake_idle",
+        begins="generate_begins",
     ),
     Stage(
         "intersect",
@@ -241,6 +246,7 @@ STAGES = (
             "bounce beta radiance pdf inside eta_squared",
             "largest_weight cut cut_energy exhausted shadow_rays",
         ),
+        begins="shade_begins",
     ),
     Stage(
         "shadow_transmittance",

@@ -18,7 +18,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
     return {
         "CLVOL_LOCAL_SIZE": plan.tuning.local_size,
         "CLVOL_GROUP_SLOTS": plan.tuning.group_slots,
-        "CLVOL_LANES": 0,  # of units other than those of stages that walk in lanes
+        "CLVOL_LANES": 0,  # of units other than those of stages that have lanes
         "CLVOL_HAS_LANES": max(lanes(plan).values(), default=0),
         "CLVOL_CHANNELS": plan.channels,
         "CLVOL_SPECTRUM": plan.spectrum,

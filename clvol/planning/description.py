@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from clvol import layout
 from clvol.planning.compiled import filled_slots, plan_macros
 from clvol.planning.in_force import reasons, used_names
-from clvol.planning.lanes import lanes, said
+from clvol.planning.lanes import said, widths
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,7 +28,7 @@ def describe_plan(plan: Decisions) -> Iterator[str]:
     yield f"channels: {_channels(plan)}"
     if plan.walks_majorants:
         yield f"majorant cells: {_cells(plan)}"
-    if lanes(plan):
+    if widths(plan):
         yield from _paragraph("lanes", said(plan))
     yield "stages, in the order of launches: from which queue, to which"
     for name in layout.launched(macros):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from clvol.planning import registry
-from clvol.planning.lanes import against
 from clvol.planning.names import Names
 
 if TYPE_CHECKING:
@@ -40,7 +39,7 @@ def used_names(plan: Decisions) -> Names:
         "next_event": ("control" if plan.direction_control else "plain")
         if plan.nee and features.scattering
         else "none",
-        "lanes": chosen["lanes"] if "" in against(plan).values() else "none",
+        "lanes": chosen["lanes"],
     }
     return Names(used)
 
@@ -80,7 +79,7 @@ def reasons(plan: Decisions) -> dict[str, str]:
         "shadow_cache": "no shadow ray passes a heterogeneous medium",
         "light_choice": "there is one light at most to sample",
         "next_event": "no light is sampled in media",
-        "lanes": "; ".join(dict.fromkeys(against(plan).values())) or "no walk goes from look-up to look-up",
+        "lanes": "",
     }
     found = {}
     for family, name in used.items():
@@ -91,8 +90,6 @@ def reasons(plan: Decisions) -> dict[str, str]:
 
 def _instead(plan: Decisions, family: str, used: str) -> str:
     """What is to be said of a choice that was made, and is not in force as it stands."""
-    if family == "lanes":
-        return f" is not used: {reasons(plan)[family]}"
     if used == "none":
         return f" is not used: nothing in this render needs {'an' if family[0] in 'aeiou' else 'a'} {family}"
     if family == "transmittance":
@@ -113,8 +110,6 @@ def warnings(plan: Decisions, asked: Mapping[str, str]) -> Iterator[str]:
     """
     used, features = used_names(plan), plan.features
     for family, value in asked.items():
-        if (family, value) == ("lanes", "off"):
-            continue  # where no walk could go in lanes, none does
         if value not in ("auto", used[family]):
             yield f"{family} {value}{_instead(plan, family, used[family])}"
     if plan.choices.majorant_scale != 1 and used["majorant"] == "none":

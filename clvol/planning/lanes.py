@@ -1,12 +1,14 @@
 """Which stages walk their paths side by side, in the lanes of vectors, and what is against it elsewhere.
 
-A walk in lanes draws other random numbers than one by itself, and the same at every width.
+A walk in lanes draws other random numbers than one by itself, the same at every width.  Stages that do not
+walk draw the numbers that their paths decide by in lanes: the same ones.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from clvol import layout
 from clvol.planning import registry
 
 if TYPE_CHECKING:
@@ -48,16 +50,28 @@ def against(plan: Decisions) -> dict[str, str]:
     return found
 
 
+def _width(plan: Decisions) -> int:
+    return int(plan.chosen["lanes"]) if plan.chosen["lanes"].isdecimal() else 0
+
+
 def lanes(plan: Decisions) -> dict[str, int]:
     """Stages that walk their paths in lanes, and in how many."""
-    width = int(plan.chosen["lanes"]) if plan.chosen["lanes"].isdecimal() else 0
+    width = _width(plan)
     return {stage: width for stage, hurdle in against(plan).items() if width and not hurdle}
 
 
+def widths(plan: Decisions) -> dict[str, int]:
+    """Lanes of every stage that has any: those that walk in them, and those that draw numbers in them."""
+    width = _width(plan)
+    return {stage.name: width for stage in layout.STAGES if stage.begins and width} | lanes(plan)
+
+
 def said(plan: Decisions) -> str:
-    """Which stages walk in lanes, and why others don't."""
-    words = {"": f"{max(lanes(plan).values(), default=0)} paths at a time"}
-    return "; ".join(
+    """Which stages walk or draw in lanes, and why others don't."""
+    words = {"": f"{_width(plan)} paths at a time"}
+    walks = [
         f"{stage} {words.get(hurdle, f'one path at a time: {hurdle}')}"
         for stage, hurdle in against(plan).items()
-    )
+    ]
+    drawing = " and ".join(stage for stage in widths(plan) if stage not in against(plan))
+    return "; ".join([*walks, f"{drawing} draw for {_width(plan)} at a time"])

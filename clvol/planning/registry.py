@@ -139,7 +139,7 @@ LOOKUPS = {
 ABSORPTIONS = {
     "sample": Choice("a collision absorbs the path with probability sigma_a / sigma_t"),
     "weight": Choice("a collision multiplies the path's weight by the albedo"),
-    "mixed": Choice("by weight while the path's weight is above 1/2, sampled below"),
+    "mixed": Choice("by weight while the path's weight is above 3/10, sampled below"),
 }
 ROULETTES = {
     "depth": Choice("from rr_depth scatterings on, a path survives with its weight as probability"),

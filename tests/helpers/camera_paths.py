@@ -36,7 +36,10 @@ def start_paths(device, scene, samples):
         Scene with_state = *scene;
         with_state.state = out1;
         with_state.slot_stride = count;
-        start_job(&with_state, i, i);
+        Draws draws;
+        draws.key = job_key(&with_state, i);
+        draws.segment = 0;
+        start_job(&with_state, i, i, &draws);
         out0[i] = i;"""
     probe.run(["stages/generate.h"], body, [pixel, state], stage="generate")
     pixel = state[[f.name for f in fields].index("pixel")]

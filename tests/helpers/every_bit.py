@@ -30,8 +30,8 @@ def scene():
 
 
 def rendered(described, **options):
-    """With the sampler that users get."""
-    return clvol.render(described, sampler="joint", **options)
+    """With the sampler that users get, where none is given."""
+    return clvol.render(described, **{"sampler": "joint"} | options)
 
 
 def digest(result):

@@ -237,7 +237,8 @@ def test_paths_are_moved_by_transitions_alone(device):
         for stage in (s for s in STAGES if s.name in plan.stages):
             bodies = functions(programs.stage_source(plan, stage.name))
             pushing = {name for name, body in bodies.items() if "queue_push(" in body}
-            assert pushing == {t.function for t in stage.transitions if t.to != IDLE}
+            waking = {"from_idle"} if stage.wakes else set()
+            assert pushing == waking | {t.function for t in stage.transitions if t.to != IDLE}
             assert not [n for n in bodies if n in {f"set_path_{value}" for value in stage.sets}]
 
 

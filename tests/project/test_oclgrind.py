@@ -68,7 +68,7 @@ def test_what_is_found_is_told_with_its_places_and_counted(oclgrind: ModuleType,
 
 def test_no_race_passes_but_those_of_counters_that_are_looked_at_first(oclgrind: ModuleType) -> None:
     known = ("scene->counters[COUNTER_NEXT_JOB] >= limit", "atomic_inc(scene->counters + COUNTER_NEXT_JOB)")
-    others = (("set_path_job(scene, slot, NO_JOB)", "atomic_add(idle_slots"), (known[0], known[0]))
+    others = (("set_path_job(scene, slot, job)", "atomic_add(idle_slots"), (known[0], known[0]))
     for places, harmless in ((known, True), *((places, False) for places in others)):
         [race] = [f for f in oclgrind.findings(log(*places)) if "race" in f.what]
         assert race.is_harmless == harmless

@@ -17,8 +17,9 @@ SPP = 32
 SAMPLER = auto.DEFAULT_SAMPLER
 """That of users, which a fixture replaces for other tests."""
 PER_SAMPLE = ("lookups", "cells", "collisions", "shadow_rays", "handled", "lanes_busy")
-CLOSE = 0.05
-"""Relative: other random numbers, or another device's rounding, move counts per sample by less."""
+CLOSE = {"lanes_busy": 0.1}
+"""Relative, else 0.05: other random numbers, or another device's rounding, move counts per sample by less.
+Which paths are in lanes together depends on which work-item was free for them."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +44,12 @@ class Counters:
 
 
 PINNED = {
-    "cloud": Counters(6.697, 8.751, 1.436, 0, 8.202, 0.4479, 4, 112),
+    "cloud": Counters(7.009, 9.018, 1.586, 0, 9.691, 0.4345, 4, 112),
     "cloud_dense": Counters(41.85, 20.27, 7.764, 1.159, 28.46, 0.2724, 5, 148),
-    "chroma": Counters(14.33, 25.61, 3.347, 0, 21.91, 0.4489, 4, 116),
-    "box_smoke": Counters(6.938, 11.92, 0.6023, 2.138, 11.36, 0.3615, 5, 208),
-    "thin_sparse": Counters(3.743, 14.16, 0.2156, 0.1879, 4.835, 0.4341, 5, 152),
-    "emissive": Counters(30.35, 9.57, 0.6843, 0, 5.755, 0, 4, 120),
+    "chroma": Counters(14.72, 26.01, 3.54, 0, 25.55, 0.4369, 4, 116),
+    "box_smoke": Counters(7.38, 12.44, 0.7119, 2.186, 12.84, 0.3599, 5, 208),
+    "thin_sparse": Counters(3.754, 14.19, 0.2156, 0.1909, 5.838, 0.4337, 5, 152),
+    "emissive": Counters(30.35, 9.57, 0.6843, 0, 6.794, 0, 4, 120),
 }
 
 
@@ -72,5 +73,5 @@ def test_a_render_does_no_more_and_no_less_than_it_did(name, tmp_path):
     values = ", ".join(f"{getattr(now, f.name):.4g}" for f in fields(now))
     for field in fields(now):
         pinned, value = getattr(PINNED[name], field.name), getattr(now, field.name)
-        slack = CLOSE if field.name in PER_SAMPLE else 0.0
+        slack = CLOSE.get(field.name, 0.05) if field.name in PER_SAMPLE else 0.0
         assert value == pytest.approx(pinned, rel=slack), f'now: "{name}": Counters({values}),'

@@ -1,0 +1,64 @@
+/* A work-item's paths of a stage that says what it will draw for each: in lanes the random numbers of a packet of
+   CLVOL_LANES paths are drawn side by side, before the stage handles one after the other.  Which blocks a stage reads
+   its DRAWS_* say. */
+#include "path/draws.h"
+
+#if CLVOL_LANES
+/* The blocks of a packet. */
+typedef struct {
+    BitsBlock own, direction, light;
+} PacketBlocks;
+
+INLINE void draw_packet(const Scene *scene, const Draws *draws, uint count, PacketBlocks *drawn)
+{
+    const Bits none = (Bits)(0u);
+    LaneKeys keys = {none, none, none};
+    Bits blocks = none, segments = none;
+    for (uint lane = 0; lane < count; ++lane) {
+        set_lane_uint(keys.pixel, lane, draws[lane].key.pixel);
+        set_lane_uint(keys.sample, lane, draws[lane].key.sample);
+        set_lane_uint(keys.bounce, lane, draws[lane].key.bounce);
+        set_lane_uint(blocks, lane, draws[lane].block);
+        set_lane_uint(segments, lane, draws[lane].segment);
+    }
+    if (DRAWS_OWN)
+        drawn->own = lane_decisions(scene, &keys, blocks, segments);
+    keys.bounce += 1u;
+    if (DRAWS_DIRECTION)
+        drawn->direction = lane_decisions(scene, &keys, (Bits)(BLOCK_DIRECTION), none);
+    if (DRAWS_LIGHT)
+        drawn->light = lane_decisions(scene, &keys, (Bits)(BLOCK_LIGHT), none);
+}
+
+INLINE void handle_paths(const Scene *scene, uint group, __global const uint *slots, uint count)
+{
+    uint packet[CLVOL_LANES];
+    Draws draws[CLVOL_LANES];
+    PacketBlocks drawn;
+    for (uint i = get_local_id(0); i < count;) {
+        uint paths = 0;
+        for (; i < count && paths < CLVOL_LANES; i += CLVOL_LOCAL_SIZE) {
+            packet[paths] = slots[i];
+            if (STAGE_BEGINS(scene, group, slots[i], &draws[paths]))
+                ++paths;
+        }
+        draw_packet(scene, draws, paths, &drawn);
+        for (uint lane = 0; lane < paths; ++lane) {
+            draws[lane].own = &drawn.own;
+            draws[lane].direction = &drawn.direction;
+            draws[lane].light = &drawn.light;
+            draws[lane].lane = lane;
+            STAGE(scene, group, packet[lane], &draws[lane]);
+        }
+    }
+}
+#else
+INLINE void handle_paths(const Scene *scene, uint group, __global const uint *slots, uint count)
+{
+    for (uint i = get_local_id(0); i < count; i += CLVOL_LOCAL_SIZE) {
+        Draws draws;
+        if (STAGE_BEGINS(scene, group, slots[i], &draws))
+            STAGE(scene, group, slots[i], &draws);
+    }
+}
+#endif
