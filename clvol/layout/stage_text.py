@@ -22,6 +22,7 @@ _FROM_IDLE = """\
 INLINE void from_idle({slot})
 {{
     queue_push(scene, group, QUEUE_{queue}, slot);
+    group_atomic_add(queue_handled(scene, group, QUEUE_{queue}), -1u); /* no path has ended there */
 }}"""
 
 
