@@ -4,9 +4,10 @@
 #include "path/draws.h"
 
 #if CLVOL_LANES
-/* The blocks of a packet. */
+/* The blocks of a packet: the paths' own, then of the next bounce that of the direction and that of the light. */
+#define PACKET_BLOCKS (DRAWS_LIGHT ? 3u : (DRAWS_DIRECTION ? 2u : 1u))
 typedef struct {
-    BitsBlock own, direction, light;
+    BitsBlock block[PACKET_BLOCKS];
 } PacketBlocks;
 
 INLINE void draw_packet(const Scene *scene, const Draws *draws, uint count, PacketBlocks *drawn)
@@ -21,13 +22,13 @@ INLINE void draw_packet(const Scene *scene, const Draws *draws, uint count, Pack
         set_lane_uint(blocks, lane, draws[lane].block);
         set_lane_uint(segments, lane, draws[lane].segment);
     }
-    if (DRAWS_OWN)
-        drawn->own = lane_decisions(scene, &keys, blocks, segments);
-    keys.bounce += 1u;
-    if (DRAWS_DIRECTION)
-        drawn->direction = lane_decisions(scene, &keys, (Bits)(BLOCK_DIRECTION), none);
-    if (DRAWS_LIGHT)
-        drawn->light = lane_decisions(scene, &keys, (Bits)(BLOCK_LIGHT), none);
+#pragma unroll 1 /* what draws a block is long, and stands once */
+    for (uint n = 0; n < PACKET_BLOCKS; ++n) {
+        drawn->block[n] = lane_decisions(scene, &keys, blocks, segments);
+        keys.bounce += n == 0 ? 1u : 0u;
+        blocks = (Bits)(n == 0 ? BLOCK_DIRECTION : BLOCK_LIGHT);
+        segments = none;
+    }
 }
 
 INLINE void handle_paths(const Scene *scene, uint group, __global const uint *slots, uint count)
@@ -44,9 +45,7 @@ INLINE void handle_paths(const Scene *scene, uint group, __global const uint *sl
         }
         draw_packet(scene, draws, paths, &drawn);
         for (uint lane = 0; lane < paths; ++lane) {
-            draws[lane].own = &drawn.own;
-            draws[lane].direction = &drawn.direction;
-            draws[lane].light = &drawn.light;
+            draws[lane].drawn = drawn.block;
             draws[lane].lane = lane;
             STAGE(scene, group, packet[lane], &draws[lane]);
         }

@@ -10,7 +10,7 @@ typedef struct {
     SampleKey key;
     uint block, segment; /* of its own block, which the stage says */
 #if CLVOL_LANES
-    const BitsBlock *own, *direction, *light;
+    const BitsBlock *drawn; /* its own, BLOCK_DIRECTION and BLOCK_LIGHT, as far as the stage draws them */
     uint lane;
 #endif
 } Draws;
@@ -20,7 +20,7 @@ INLINE uint4 drawn_block(const Scene *scene, const Draws *draws, uint block)
 {
     const bool next = block == BLOCK_DIRECTION || block == BLOCK_LIGHT;
 #if CLVOL_LANES
-    const BitsBlock *drawn = next ? (block == BLOCK_LIGHT ? draws->light : draws->direction) : draws->own;
+    const BitsBlock *drawn = draws->drawn + (next ? (block == BLOCK_LIGHT ? 2 : 1) : 0);
     const uint lane = draws->lane;
     return (uint4)(lane_uint(drawn->x, lane), lane_uint(drawn->y, lane), lane_uint(drawn->z, lane),
                    lane_uint(drawn->w, lane));

@@ -5,7 +5,6 @@
 #include "path/reset.h"
 #include "path/transitions.h"
 
-#define DRAWS_OWN 1
 #define DRAWS_DIRECTION 0
 #define DRAWS_LIGHT 0
 

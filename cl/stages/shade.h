@@ -13,7 +13,6 @@
 #include "stages/escape.h"
 #include "stages/surface_scatter.h"
 
-#define DRAWS_OWN ((CLVOL_HAS_SCATTERING && CLVOL_ABSORPTION != ABSORPTION_WEIGHT) || CLVOL_HAS_SURFACES)
 #define DRAWS_DIRECTION (CLVOL_HAS_SCATTERING || CLVOL_HAS_REFLECTION)
 #define DRAWS_LIGHT CLVOL_NEE
 
