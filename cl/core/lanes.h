@@ -60,8 +60,8 @@ typedef LANES_JOIN(uint, CLVOL_LANES) Bits;
 #define lane_int(vector, lane) (((const int *)&(vector))[lane])
 #define lane_uint(vector, lane) (((const uint *)&(vector))[lane])
 
-/* p[i] in every lane, by loads of its own: the gather instructions of processors are slower.  Without a sign, which an
-   address would have to be extended by: that takes 3 to 5 % off walks. */
+/* p[i] in every lane, by loads of its own: the gather instructions of processors are slower.  i is not negative:
+   without a sign, which an address would have to be extended by, walks take 3 to 5 % less. */
 #define gather_real(p, i) ((Real)gather(p, i))
 #define gather_int(p, i) ((Int)gather(p, i))
 #define gather_bits(p, i) ((Bits)gather(p, i))

@@ -43,7 +43,8 @@ INLINE void handle_paths(const Scene *scene, uint group, __global const uint *sl
             if (STAGE_BEGINS(scene, group, slots[i], &draws[paths]))
                 ++paths;
         }
-        draw_packet(scene, draws, paths, &drawn);
+        if (paths > 0)
+            draw_packet(scene, draws, paths, &drawn);
         for (uint lane = 0; lane < paths; ++lane) {
             draws[lane].drawn = drawn.block;
             draws[lane].lane = lane;

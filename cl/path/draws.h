@@ -5,7 +5,8 @@
 #include "core/sampler.h"
 #include "core/scene.h"
 
-/* Of a path, by its stage: the numbers of a block of its own, and, where it scatters, those of the next bounce. */
+/* Of a path, by its stage: the numbers of a block of its own, and those of the next bounce, as far as DRAWS_DIRECTION
+   and DRAWS_LIGHT of the stage say that it reads them. */
 typedef struct {
     SampleKey key;
     uint block, segment; /* of its own block, which the stage says */

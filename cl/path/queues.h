@@ -2,7 +2,8 @@
 
    A work-group owns CLVOL_GROUP_SLOTS slots and its own part of every queue, so that groups never
    wait for each other.  A queue holds slot numbers; its order is not defined and nothing depends on it.
-   Stages push by the transitions of their contracts (clvol/layout/stages.py), which are all that calls queue_push. */
+   Stages push by the transitions of their contracts (clvol/layout/stages.py), and the stage that wakes idle slots by
+   from_idle(), before its loop: nothing else calls queue_push. */
 #ifndef CLVOL_PATH_QUEUES_H
 #define CLVOL_PATH_QUEUES_H
 #include "core/scene.h"
@@ -43,8 +44,8 @@ INLINE void queue_push(const Scene *scene, uint group, uint queue, uint slot)
     queue_entries(scene, group, queue)[place] = slot;
 }
 
-/* Empties a queue once the whole group has read its length and entries; nobody pushes to the queue
-   that its own stage reads. */
+/* Empties a queue once the whole group has read its length and entries; nobody pushes to the queue that its own stage
+   reads, once the group has passed the barrier behind what wakes idle slots (kernels/stage.cl). */
 INLINE void queue_clear(const Scene *scene, uint group, uint queue)
 {
     barrier(CLK_GLOBAL_MEM_FENCE);

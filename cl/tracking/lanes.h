@@ -17,7 +17,7 @@
 typedef struct {
     MediumRay in;
     uint4 k; /* the first distance, -, the stream's seed (2) */
-    float depth; /* the optical depth that the first distance stands for */
+    float depth; /* that k.x stands for, to be walked to the first tentative collision */
     float from;
 } LaneWalk;
 

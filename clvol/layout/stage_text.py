@@ -1,4 +1,4 @@
-"""OpenCL text of a stage's contract: the macros of its loop (cl/kernels/stage.cl) and its transitions."""
+"""OpenCL text of a stage's contract: the macros of its kernel (cl/kernels/stage.cl) and its transitions."""
 
 from __future__ import annotations
 

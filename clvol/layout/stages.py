@@ -3,8 +3,8 @@
 A contract says which queue a stage empties, where it may hand a path on to and why, and which values of the
 path it reads and writes.
 
-What moves paths is made from this table (`clvol.layout.stage_text`): the loop over a queue that each stage's
-kernel is, the functions that hand a path on, `to_shade(scene, group, slot, EVENT_WALK)`, and those that read
+What moves paths is made from this table (`clvol.layout.stage_text`): the kernel of each stage, the functions
+that hand a path on, `to_shade(scene, group, slot, EVENT_WALK)`, and those that read
 and write a path's values.  A unit has those of its stage's contract and no others: what a contract does not
 name does not compile.  A test finds what is named but not used.
 """
@@ -41,7 +41,7 @@ QUEUES = {
     "SHADOW": Queue("paths whose shadow ray is under way"),
 }
 IDLE = "IDLE"
-"""Where slots are that hold no path: counted, in no queue."""
+"""Where slots are that hold no path: counted, in no queue until the stage that wakes them handles them."""
 HANDLED = slice(len(QUEUES) + 1, 2 * len(QUEUES) + 1)
 """Of a group's counters, behind the queues' lengths and the idle slots: paths handled, by queue."""
 EVENTS = {
@@ -94,7 +94,8 @@ class Stage:
     wakes : function that the group calls before its loop, which may put slots that are in no queue into the
         stage's own, by ``from_idle(scene, group, slot)``.
     begins : function that is called with every path first.  It hands the path on and returns false, or says
-        which random numbers the stage will draw for it, so that they can be drawn in lanes.
+        which random numbers the stage will draw for it, so that they can be drawn in lanes.  Not of stages
+        that stand by.
     stands_by : event that brings a path back in the next wave, of stages whose walks may take long: a
         work-item that has taken its share of steps hands its other paths on with this event.  The stage's
         function returns the steps that it took.
@@ -272,8 +273,8 @@ STAGES = (
     ),
 )
 """In the order of their launches in a wave, and of the queues that they empty: a path that nothing holds up
-goes from a new ray to the next one in one wave.  No stage pushes to the queue that it empties: walks that
-need another go through `shade`."""
+goes from a new ray to the next one in one wave.  No stage hands a path on to the queue that it
+empties: walks that need another go through `shade`."""
 
 
 def stage(name: str) -> Stage:

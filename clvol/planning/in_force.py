@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from clvol.planning import registry
+from clvol.planning.lanes import against
 from clvol.planning.names import Names
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ def used_names(plan: Decisions) -> Names:
         "next_event": ("control" if plan.direction_control else "plain")
         if plan.nee and features.scattering
         else "none",
-        "lanes": chosen["lanes"],
+        "lanes": chosen["lanes"] if "" in against(plan).values() else "none",
     }
     return Names(used)
 
@@ -79,7 +80,7 @@ def reasons(plan: Decisions) -> dict[str, str]:
         "shadow_cache": "no shadow ray passes a heterogeneous medium",
         "light_choice": "there is one light at most to sample",
         "next_event": "no light is sampled in media",
-        "lanes": "",
+        "lanes": "; ".join(dict.fromkeys(against(plan).values())) or "no walk goes from look-up to look-up",
     }
     found = {}
     for family, name in used.items():
@@ -110,6 +111,8 @@ def warnings(plan: Decisions, asked: Mapping[str, str]) -> Iterator[str]:
     """
     used, features = used_names(plan), plan.features
     for family, value in asked.items():
+        if family == "lanes":
+            continue  # where no walk goes in lanes, numbers are drawn in them: the same as one by one
         if value not in ("auto", used[family]):
             yield f"{family} {value}{_instead(plan, family, used[family])}"
     if plan.choices.majorant_scale != 1 and used["majorant"] == "none":

@@ -220,7 +220,7 @@ def test_lanes_decide_by_the_numbers_that_paths_alone_decide_by(device, sampler,
     probe = Probe(device, scene_with("constant"), sampler=sampler)
     one = """
     const SampleKey key = {in0[4 * i], in0[4 * i + 1], in0[4 * i + 2]};
-    const uint4 k = decision_block(scene, key, BLOCK_WALK, in0[4 * i + 3]);
+    const uint4 k = decision_block(scene, key, i % 6u, in0[4 * i + 3]);
     out0[4 * i] = k.x, out0[4 * i + 1] = k.y, out0[4 * i + 2] = k.z, out0[4 * i + 3] = k.w;
     """
     probe.run([], one, [alone], [keys])
@@ -229,13 +229,14 @@ def test_lanes_decide_by_the_numbers_that_paths_alone_decide_by(device, sampler,
         return;
     const Bits none = (Bits)(0u);
     LaneKeys keys = {none, none, none};
-    Bits segment = none;
+    Bits segment = none, block = none;
     for (uint n = 0; n < CLVOL_LANES; ++n) {
         __global const uint *key = in0 + 4 * (i + n);
         ((uint *)&keys.pixel)[n] = key[0], ((uint *)&keys.sample)[n] = key[1];
         ((uint *)&keys.bounce)[n] = key[2], ((uint *)&segment)[n] = key[3];
+        ((uint *)&block)[n] = (i + n) % 6u; /* every BLOCK_* */
     }
-    const BitsBlock k = lane_decisions(scene, &keys, BLOCK_WALK, segment);
+    const BitsBlock k = lane_decisions(scene, &keys, block, segment);
     for (uint n = 0; n < CLVOL_LANES; ++n) {
         __global uint *out = out0 + 4 * (i + n);
         out[0] = ((const uint *)&k.x)[n], out[1] = ((const uint *)&k.y)[n];

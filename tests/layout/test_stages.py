@@ -35,6 +35,7 @@ def test_every_queue_is_emptied_by_one_stage_which_never_pushes_to_it():
     assert [stage.empties for stage in STAGES] == list(QUEUES)
     for stage in STAGES:
         assert stage.empties not in {t.to for t in stage.transitions}
+        assert not (stage.begins and stage.stands_by)
         assert {t.to for t in stage.transitions} <= {*QUEUES, IDLE}
 
 

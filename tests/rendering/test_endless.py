@@ -48,6 +48,7 @@ def test_walks_in_short_legs_give_the_same_picture(bounds, kind, technique, tran
     assert_same_picture(whole, cut)
 
 
+@pytest.mark.contract
 def test_legs_do_not_depend_on_how_waves_are_cut(bounds):
     """Slots that a stage leaves to the next wave keep their bits."""
     scene = scene_of("sheets")

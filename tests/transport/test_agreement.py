@@ -69,6 +69,7 @@ def test_global_majorants_and_kd_trees_show_the_picture_of_a_grid(majorant):
     assert_same_picture(reference(), other)
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("absorption", ["sample", "weight"])
 def test_absorption_by_event_and_by_weight_show_the_picture_of_the_mixture(absorption):
     other = cloud_picture(SKY_AND_SUN, absorption=absorption, seed=3)
@@ -91,6 +92,7 @@ def brightened(result, fraction, where=slice(None)):
     return replace(result, image=image)
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("fraction", [-0.005, 0.005])
 def test_a_bias_of_half_a_percent_is_rejected(fraction):
     """Planted in one picture of each kind of pair that is compared above."""

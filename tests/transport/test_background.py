@@ -38,6 +38,7 @@ def shown(background, spp=1 << 11, limits=(), **options):
     return render(scene(**dict(limits)), spp=spp, seed=seed, **options)
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: "-".join(way.values()))
 def test_the_picture_is_the_same(way):
     expected, sampled = shown("expected", **way), shown("sampled", **WAYS[0])
@@ -45,6 +46,7 @@ def test_the_picture_is_the_same(way):
     assert_same_picture(expected, sampled)
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("way", WAYS[:2], ids=lambda way: "-".join(way.values()))
 def test_it_is_less_noisy_where_the_transmittance_is_well_known(way):
     """Loose majorants make for many look-ups."""
@@ -54,6 +56,7 @@ def test_it_is_less_noisy_where_the_transmittance_is_well_known(way):
     assert noise["expected"] < 0.8 * noise["sampled"]
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("wrong", [0.0, 4.0, -3.0], ids=["zero", "too bright", "negative"])
 @pytest.mark.parametrize("way", WAYS[:2], ids=lambda way: "-".join(way.values()))
 def test_any_guess_of_what_collisions_bring_has_the_same_mean(monkeypatch, way, wrong):
@@ -82,6 +85,7 @@ def test_a_furnace_has_no_noise(way):
     assert result.image == pytest.approx(1.0, rel=1e-4)
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("way", WAYS[:2], ids=lambda way: "-".join(way.values()))
 def test_walks_of_several_legs_neither_lose_nor_double_it(bounds, way):
     bounds(WALK_STEPS=1)

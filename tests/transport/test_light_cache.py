@@ -112,6 +112,7 @@ CASES = [("a sun", 0.8, kind) for kind in WRONG] + [
 ]
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize(("name", "g", "kind"), CASES)
 def test_many_scatterings_have_the_mean_of_a_plain_render(monkeypatch, name, g, kind):
     expected, noise = plain(name, g)

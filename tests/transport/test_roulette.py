@@ -38,12 +38,14 @@ def pictured(make, rr_depth, roulette):
     return render(scene, spp=1 << 11, seed=3, absorption="weight", roulette=roulette, **choices)
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("make", [found, sampled])
 @pytest.mark.parametrize(("roulette", "rr_depth"), [("depth", 1), ("weight", 1), ("weight", 8)])
 def test_roulette_keeps_the_radiance_of_a_hohlraum(make, rr_depth, roulette):
     assert_matches(pictured(make, rr_depth, roulette), 1.0)
 
 
+@pytest.mark.contract
 def test_survivors_that_do_not_stand_for_the_others_are_caught(monkeypatch):
     original = programs.kernel_source
 

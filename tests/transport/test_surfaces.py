@@ -78,6 +78,7 @@ def test_a_furnace_with_light_sampling_is_one(name):
     assert_matches(show(sampled(FURNACES[name]), spp=1 << 14, seed=2), 1.0)
 
 
+@pytest.mark.contract
 def test_in_glass_no_light_can_be_sampled_and_every_path_weighs_one():
     result = show(sampled(FURNACES["milk in a glass mesh"]), spp=256, seed=2)
     assert np.abs(result.image - 1).max() < 1e-4
@@ -174,6 +175,7 @@ def test_a_square_lamp_lights_a_floor_through_what_lets_light_pass(name):
     assert_matches(show(scene, spp=1 << 13, seed=4), answer[..., None])
 
 
+@pytest.mark.contract
 def test_a_square_lamp_in_an_absorbing_room_is_dimmed_on_both_ways():
     """The camera's rays start at the near plane."""
     sigma = 0.4
@@ -317,6 +319,7 @@ def test_no_light_leaks_into_a_closed_black_room(target, medium):
     assert (result.image == 0).all() and result.stats["non_finite"] == 0
 
 
+@pytest.mark.contract
 def test_a_scene_far_from_the_origin_is_the_scene_at_the_origin():
     shapes = [
         surfaced(icosphere(medium=MILK), GLASS),

@@ -331,6 +331,7 @@ def test_overlapping_media_are_one_medium_of_summed_coefficients():
     assert (6 * np.hypot(error, other) < 0.01 * mean).all()  # a bias of 1 % would have been seen
 
 
+@pytest.mark.contract
 def test_an_overlap_that_lost_its_second_medium_is_noticed():
     lost = overlapping_media(extra=0.0)
     a, b = (

@@ -61,6 +61,7 @@ def room():
 SCENES = {"cloud": cloud, "channels": lambda: cloud((12.0, 6.0, 2.0)), "room": room}
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("transmittance", ["ratio", "delta"])
 @pytest.mark.parametrize("kind", SCENES)
 def test_walks_in_lanes_and_one_by_one_show_the_same_picture(kind, transmittance):
@@ -91,6 +92,7 @@ def test_groups_of_a_gpu_do_not_touch_a_bit(sixteen, monkeypatch):
     assert digest(rendered(cloud(), spp=SPP, seed=7)) == digest(sixteen)
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("kind", SCENES)
 def test_walks_in_lanes_may_go_in_legs(kind, bounds):
     """Of three steps each, whatever their number."""
@@ -132,7 +134,7 @@ BESIDE = box((2, 0, 0), (3, 1, 1), homogeneous(1.0, 0.9))
 def test_a_plan_says_which_stages_walk_in_lanes_and_what_is_against_it(scene, choices, stages, said):
     plan = clvol.plan(scene, **choices)
     assert stages_in_lanes(plan) == stages
-    assert said in " ".join(" ".join(plan.describe()).split())
+    assert said in next(line for line in plan.describe() if line.startswith("  lanes"))
 
 
 def test_a_device_decides_where_nobody_else_does():
@@ -147,6 +149,7 @@ def test_a_device_decides_where_nobody_else_does():
 
 def test_where_no_walk_goes_in_lanes_numbers_are_drawn_in_them():
     several = Plan.of(cloud(more=[BESIDE]), Choices(lanes="8"))
+    assert several.in_force["lanes"] == "none", "pictures with lanes and without are the same"
     assert stages_in_lanes(several) == {} and widths(several) == {"generate": 8, "shade": 8}
     assert "generate and shade draw for 8 at a time" in " ".join(str(several).split())
     assert not list(warnings(several, {"lanes": "8"}))
