@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from benchmarks.cloud import Z_LIMIT
-from benchmarks.peers import AGAINST, CLVOL, CYCLES, MITSUBA
+from benchmarks.peers import CLVOL, CYCLES, MITSUBA
 from benchmarks.tables import Row, at_least, ranged, show
 
 if TYPE_CHECKING:
@@ -95,15 +95,20 @@ def _scene_row(name: str, scene: Figures) -> Row:
     return at_least(figure, measured, AIMS[name], min(others)) if others else Row(figure, measured)
 
 
+def _two_digits(number: float) -> str:
+    """As 0.53, 8.1, 42 or 5,900."""
+    return f"{float(f'{number:.2g}'):,.0f}" if number >= 10 else f"{number:.2g}"
+
+
 def overview(figures: Figures) -> list[str]:
-    """Lines of Markdown: efficiency over that of each other program, a row for each scene."""
-    kinds = [k for k in (*OTHERS, AGAINST) if any(k in s["over"] for s in figures["scenes"].values())]
+    """Lines of Markdown: efficiency over that of each other renderer, a row for each scene."""
+    kinds = [k for k in OTHERS if any(k in s["over"] for s in figures["scenes"].values())]
     labels = {kind: side["label"] for s in figures["scenes"].values() for kind, side in s["sides"].items()}
     heads = [f"times {labels[kind]}" for kind in kinds]
     lines = ["| scene | " + " | ".join(["clvol, millions", *heads]) + " |", "|---" * (len(kinds) + 2) + "|"]
     for scene in figures["scenes"].values():
         ours = f"{scene['sides'][CLVOL]['efficiency']['median'] / 1e6:.3g}"
-        times = [f"{scene['over'][k]['median']:.2g}" if k in scene["over"] else NONE for k in kinds]
+        times = [_two_digits(scene["over"][k]["median"]) if k in scene["over"] else NONE for k in kinds]
         lines.append("| " + " | ".join([f"{scene['letter']}: {scene['about']}", ours, *times]) + " |")
     return lines
 
