@@ -106,6 +106,7 @@ def test_a_bias_of_half_a_percent_is_rejected(fraction):
             assert_same_picture(reference(), brightened(other, fraction))
 
 
+@pytest.mark.contract
 def test_a_bias_of_one_tile_is_rejected():
     tile = slice(16, 24), slice(8, 16)
     biased = brightened(cloud_picture(SKY_AND_SUN, "kdtree", seed=2), 0.03, tile)

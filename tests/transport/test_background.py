@@ -66,6 +66,7 @@ def test_any_guess_of_what_collisions_bring_has_the_same_mean(monkeypatch, way, 
     assert_same_picture(result, shown("sampled", **WAYS[0]))
 
 
+@pytest.mark.contract
 @pytest.mark.parametrize("way", WAYS[:2], ids=lambda way: "-".join(way.values()))
 def test_what_is_seen_through_a_medium_that_nothing_scatters_twice_in_is_its_transmittance(way):
     """max_depth 1 leaves only what gets through: the sky's radiance times exp(-depth)."""

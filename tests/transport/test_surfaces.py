@@ -187,6 +187,7 @@ def test_a_square_lamp_in_an_absorbing_room_is_dimmed_on_both_ways():
     assert_matches(show(scene, spp=1 << 16, seed=5), answer[..., None])
 
 
+@pytest.mark.contract
 def test_a_spherical_lamp_lights_a_floor_as_its_closed_form():
     """E = pi L r² cos / d²."""
     centre, radius = np.array([0.3, 1.4, 0.2]), 0.5
@@ -224,6 +225,7 @@ def test_a_point_light_through_a_pane_and_round_an_opaque_sphere():
     assert (show(shaded, spp=256).image == 0).all()
 
 
+@pytest.mark.contract
 def test_a_spot_in_fog_scatters_once_as_its_quadrature():
     """Seen from aside through an absorbing, scattering mesh; the beam's cone is wider than the picture."""
     sigma, albedo, g = 0.5, 0.8, 0.4

@@ -157,7 +157,9 @@ def test_where_no_walk_goes_in_lanes_numbers_are_drawn_in_them():
 
 
 @pytest.mark.parametrize("scene", [lambda: cloud(more=[BESIDE]), room], ids=["media", "room"])
-@pytest.mark.parametrize("sampler", SAMPLERS)
+@pytest.mark.parametrize(
+    "sampler", [s if s == "joint" else pytest.param(s, marks=pytest.mark.contract) for s in SAMPLERS]
+)
 def test_numbers_drawn_in_lanes_are_those_drawn_one_by_one(scene, sampler):
     """Of walks one by one, so that pictures have the same bits; roulette and absorption are drawn, too."""
     choices = {"technique": "weighted-delta", "transmittance": "regular", "sampler": sampler, "spp": 512}
