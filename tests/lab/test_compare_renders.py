@@ -58,7 +58,7 @@ def comparison(tmp_path_factory: pytest.TempPathFactory) -> Comparison:
 
     That has a twelfth of the variance of their rounds' means.
     """
-    path, scene = tmp_path_factory.mktemp("reference") / "reference.exr", cube(20)
+    path, scene = tmp_path_factory.mktemp("reference") / "reference.exr", cube(24)
     clvol.render(scene, spp=2048, technique="regular", sampler="sobol", seed=10**9).save(path)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("clvol.lab.comparison.measure._TRIAL_SECONDS", 0.0)  # trials as short as can be
