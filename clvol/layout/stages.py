@@ -4,9 +4,9 @@ A contract says which queue a stage empties, where it may hand a path on to and 
 path it reads and writes.
 
 What moves paths is made from this table (`clvol.layout.stage_text`): the kernel of each stage, the functions
-that hand a path on, `to_shade(scene, group, slot, EVENT_WALK)`, and those that read
-and write a path's values.  A unit has those of its stage's contract and no others: what a contract does not
-name does not compile.  A test finds what is named but not used.
+that hand a path on, `to_shade(scene, group, slot, EVENT_WALK)`, and those that read and write a path's
+values.  A unit has those of its stage's contract and no others: what a contract does not name does not
+compile.  A test finds what is named but not used.
 """
 
 from __future__ import annotations
@@ -273,8 +273,8 @@ STAGES = (
     ),
 )
 """In the order of their launches in a wave, and of the queues that they empty: a path that nothing holds up
-goes from a new ray to the next one in one wave.  No stage hands a path on to the queue that it
-empties: walks that need another go through `shade`."""
+goes from a new ray to the next one in one wave.  No stage hands a path on to the queue that it empties:
+walks that need another go through `shade`."""
 
 
 def stage(name: str) -> Stage:

@@ -31,7 +31,7 @@ HANDLER = EMPTIED_BY["SHADE"]
 # -- contracts among themselves --------------------------------------------------------------------------
 
 
-def test_every_queue_is_emptied_by_one_stage_which_never_pushes_to_it():
+def test_every_queue_is_emptied_by_one_stage_which_hands_no_path_on_to_it():
     assert [stage.empties for stage in STAGES] == list(QUEUES)
     for stage in STAGES:
         assert stage.empties not in {t.to for t in stage.transitions}
