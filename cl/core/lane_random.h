@@ -30,7 +30,6 @@ typedef struct {
 INLINE BitsBlock philox_lanes(BitsBlock counter, uint2 key)
 {
     Bits a = counter.x, b = counter.y, c = counter.z, d = counter.w;
-#pragma unroll 1
     for (int round = 0; round < 7; ++round) {
         const Bits high = high_product(a, 0xD2511F53u), low = a * 0xD2511F53u;
         a = high_product(c, 0xCD9E8D57u) ^ b ^ key.x;
