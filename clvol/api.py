@@ -23,6 +23,7 @@ from clvol.rendering.outcome import make_result
 from clvol.rendering.profiler import Profiler, timed
 from clvol.rendering.session import MAX_SAMPLES, Session
 from clvol.scene.records import Scene
+from clvol.scene.views import viewed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,6 +39,8 @@ def render(
     *,
     spp: int | None = None,
     seed: int | None = None,
+    sensor: int | None = None,
+    size: tuple[int, int] | None = None,
     technique: str = "auto",
     transmittance: str = "auto",
     majorant: str = "auto",
@@ -72,6 +75,11 @@ def render(
         From `load_file` or `load_dict`.
     spp, seed
         Samples per pixel and 64-bit seed. They default to the scene's.
+    sensor
+        Which of the scene's sensors sees it, from 0. The default is the first.
+    size
+        Pixels (width, height) instead of those of the scene's film. The field of view stays along the axis
+        that it is given for.
     technique, transmittance, majorant, lookup, absorption, roulette, gathering, background, probability,
     control
         Names from `clvol.planning.registry`. "auto" takes the scene's own choice, else follows fixed rules,
@@ -115,13 +123,14 @@ def render(
     Raises
     ------
     OptionError, SceneError, VolumeError, DeviceError
-        A choice, scene, volume or device that won't do.
+        A choice, sensor, size, scene, volume or device that won't do.
     RenderError
         The render was to end, and no pass of samples ever did.
     """
     given = dict(locals())
     asked = {family: given[family] for family in registry.FAMILIES}
     _check_scene("render", scene)
+    scene = viewed(scene, sensor, size)
     for family, name in asked.items():
         registry.check_choice(family, name, pilot=True)
     piloted = asked["technique"] == registry.PILOT
@@ -170,6 +179,7 @@ def render(
             extent: dict[str, Any] = {"spp": spp, "time": time_limit}
         else:  # a time limit is repeated by the samples it was enough for
             extent = {"samples": f"{first},{done}"} if first else {"spp": done}
+        extent |= {"sensor": sensor, "size": "x".join(map(str, size)) if size is not None else None}
         _say_how_to_repeat(result, scene, found, options | extent | {"seed": seed, "device": device})
     return result
 

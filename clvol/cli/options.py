@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -97,6 +98,23 @@ class SampleRange(_OptionType):
         except ValueError:
             self.fail(f"takes two numbers as 4,12, not '{value}'", param, ctx)
         return first, count
+
+
+class Size(_OptionType):
+    """Width and height in pixels, as "640x480"."""
+
+    name = "WxH"
+
+    def convert(
+        self, value: str | tuple[int, int], param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        """The two numbers; `clvol.scene.views.in_size` says what they may be."""
+        if isinstance(value, tuple):
+            return value
+        found = re.fullmatch(r"(\d{1,9})[x×](\d{1,9})", value.strip().lower())
+        if not found:
+            self.fail(f"takes width and height as 640x480, not '{value}'", param, ctx)
+        return int(found[1]), int(found[2])
 
 
 def finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:

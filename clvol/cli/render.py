@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from clvol.cli.messages import exit_by, logging_to, mention
 from clvol.cli.options import (
     ExplainedCommand,
     SampleRange,
+    Size,
     definitions_option,
     device_option,
     family_options,
@@ -78,6 +80,10 @@ class RenderCommand(ExplainedCommand):
     metavar="NAME",
     help="Add a picture to the .exr, of those below; may be given several times.",
 )
+@click.option("--size", type=Size(), metavar="WxH", help="Pixels, as 640x480; the scene's own by default.")
+@click.option(
+    "--sensor", type=click.IntRange(min=0), metavar="N", help="Which of the scene's sensors, from 0."
+)
 @click.option("--spp", type=click.IntRange(min=1), help="Samples per pixel; the scene's own by default.")
 @click.option(
     "--samples",
@@ -141,6 +147,7 @@ def render(
     from clvol.base.progress import RichProgress, error_console
     from clvol.cli.profile import profile_lines
     from clvol.picture.saving import check_disk, save_all
+    from clvol.scene.views import viewed
 
     if spp is not None and time_limit is not None:
         raise click.UsageError("give --spp or --time, not both")
@@ -150,7 +157,7 @@ def render(
         import clvol
 
         loaded = clvol.load_file(scene, **dict(definitions))
-        pixels = loaded.film.window[2] * loaded.film.window[3]
+        pixels = math.prod(viewed(loaded, options["sensor"], options["size"]).film.window[2:])
         for output in outputs:
             check_disk(output, pixels, len(options["aov"]))
         piloted = options["technique"] == "auto:pilot"

@@ -14,6 +14,7 @@ from clvol.scene import records
 from clvol.scene.materials import Bsdf, Dielectric, Mask, Null, TwoSided
 from clvol.volumes import VdbGridInfo, list_vdb, read_vdb, read_volume
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
+from clvol.volumes.listing import box_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -65,7 +66,7 @@ def _sparse_lines(grid: SparseGrid) -> Iterator[str]:
         share = grid.active_voxels / int(size.astype(np.int64).prod())
         yield f"{grid.name}: sparse, {size[0]} x {size[1]} x {size[2]} samples in the active box"
         yield f"  box      {_box(grid.active_box)} (index)"
-        yield f"           {_box(_world_box(grid))} (world)"
+        yield f"           {_box(box_of(grid.active_box, grid.index_to_world))} (world)"
         yield (
             f"  active   {grid.active_voxels:,} voxels, {100 * share:.3g} % of the box; "
             f"{len(grid.leaf_origins):,} leaves, {int(grid.tile_active.sum()):,} active tiles"
@@ -127,14 +128,6 @@ def active_statistics(grid: SparseGrid) -> Statistics:
     return Statistics.of(grid.leaf_values[active]) + Statistics.of(
         grid.tile_values[grid.tile_active], tile_samples
     )
-
-
-def _world_box(grid: SparseGrid) -> np.ndarray:
-    """Axis-aligned world box (2, 3) around the positions of the active samples."""
-    lower, upper = grid.active_box.astype(np.float64)
-    corners = np.array([np.where([i & 1, i & 2, i & 4], upper, lower) for i in range(8)])
-    world = corners @ grid.index_to_world[:3, :3].T + grid.index_to_world[:3, 3]
-    return np.stack([world.min(axis=0), world.max(axis=0)])
 
 
 def describe_scene(scene: records.Scene) -> list[str]:

@@ -15,7 +15,7 @@ take seconds."""
 def scene_digest(scene: object) -> str:
     """16 hexadecimal digits that depend on every record of the scene.
 
-    All but where it was read from, its sample count and its seed.
+    All but where it was read from, its sample count, its seed, and the sensors that it is not seen by.
     """
     state = hashlib.blake2b(digest_size=8)
     _feed(state, scene)
@@ -34,7 +34,7 @@ def _feed(state: hashlib.blake2b, value: object) -> None:
     elif is_dataclass(value):
         state.update(type(value).__name__.encode())
         for field in fields(value):
-            if field.name not in ("source", "name", "spp", "seed", "choices"):
+            if field.name not in ("source", "name", "spp", "seed", "choices", "sensors"):
                 state.update(field.name.encode())
                 _feed(state, getattr(value, field.name))
     elif isinstance(value, tuple | list):

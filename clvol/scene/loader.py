@@ -13,7 +13,7 @@ from clvol.scene.library import Library, PluginTable
 from clvol.scene.mesh_files import FORMATS
 from clvol.scene.nodes import Node, from_dict
 from clvol.scene.reader import build
-from clvol.scene.records import ConstantEmitter, EnvmapEmitter, Integrator, Scene, Shape
+from clvol.scene.records import ConstantEmitter, EnvmapEmitter, Integrator, Scene, Sensor, Shape
 from clvol.scene.vocabulary import listed
 from clvol.scene.xml import read_xml
 
@@ -153,28 +153,27 @@ def _build(root: Node, source: str) -> Scene:
         if id(node) not in seen:
             seen.add(id(node))
             records[library.kind_of(node)].append((node, build(node, library)))
-    camera = _exactly_one_sensor(records["sensor"], root)
+    sensors = _sensors(records["sensor"], root)
     emitters = [(node, light) for node, light in records["emitter"] if not _is_inside(node, light, library)]
     _check_emitters(emitters)
     _check_used(records, library)
     return Scene(
-        sensor=camera.camera,
-        film=camera.film,
-        integrator=_integrator(records["integrator"], _what_has_media(camera, records["shape"])),
+        sensor=sensors[0].camera,
+        film=sensors[0].film,
+        integrator=_integrator(records["integrator"], _what_has_media(sensors, records["shape"])),
         shapes=tuple(record for _, record in records["shape"]),
         emitters=tuple(record for _, record in emitters),
-        spp=camera.sampler.spp,
-        seed=camera.sampler.seed,
+        spp=sensors[0].sampler.spp,
+        seed=sensors[0].sampler.seed,
         source=source,
+        sensors=sensors,
     )
 
 
-def _exactly_one_sensor(sensors: list[tuple[Node, sensor.Sensor]], root: Node) -> sensor.Sensor:
+def _sensors(sensors: list[tuple[Node, Sensor]], root: Node) -> tuple[Sensor, ...]:
     if not sensors:
         raise SceneError("the scene has no sensor", root.where, 'add a <sensor type="perspective">')
-    if len(sensors) > 1:
-        raise SceneError("a scene takes one sensor, this is the second", sensors[1][0].where)
-    return sensors[0][1]
+    return tuple(record for _, record in sensors)
 
 
 def _is_inside(node: Node, record: object, library: Library) -> bool:
@@ -216,9 +215,9 @@ def _check_emitters(emitters: list[tuple[Node, object]]) -> None:
             )
 
 
-def _what_has_media(camera: sensor.Sensor, shapes: list[tuple[Node, Shape]]) -> str:
+def _what_has_media(sensors: tuple[Sensor, ...], shapes: list[tuple[Node, Shape]]) -> str:
     """The first thing in the scene that names a medium, "" without."""
-    if camera.camera.medium is not None:
+    if any(sensor.camera.medium is not None for sensor in sensors):
         return "sensor"
     for _, record in shapes:
         if record.interior or record.exterior:

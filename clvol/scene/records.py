@@ -287,9 +287,30 @@ class Integrator:
     choices: dict[str, str] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Sampler:
+    """Samples per pixel and seed."""
+
+    spp: int = 4
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Sensor:
+    """A camera with its film and sampler."""
+
+    camera: Perspective
+    film: Film
+    sampler: Sampler
+
+
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Everything a render needs.  Made by `clvol.load_file` or `clvol.load_dict`."""
+    """Everything a render needs.  Made by `clvol.load_file` or `clvol.load_dict`.
+
+    `sensor`, `film`, `spp` and `seed` are those of the view that is rendered, at first the first one's;
+    `sensors` are all that the scene has, in its order (`clvol.scene.views.seen_by` takes another).
+    """
 
     sensor: Perspective
     film: Film
@@ -299,6 +320,12 @@ class Scene:
     spp: int = 4
     seed: int = 0
     source: str = ""  # file the scene came from, for messages and metadata
+    sensors: tuple[Sensor, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.sensors:
+            only = Sensor(self.sensor, self.film, Sampler(self.spp, self.seed))
+            object.__setattr__(self, "sensors", (only,))
 
     def __repr__(self) -> str:
         picture = f"{self.film.width} x {self.film.height}, {self.spp} spp"

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.scene.records import Film, Perspective, ReconstructionFilter
+from clvol.scene.records import Film, Perspective, ReconstructionFilter, Sampler, Sensor
 
 if TYPE_CHECKING:
     from clvol.scene.reader import Reader
@@ -16,23 +16,6 @@ MAX_SIDE = 65536
 MAX_PIXELS = 2**28
 FOV_AXES = ("x", "y", "diagonal", "smaller", "larger")
 _FILM_DIAGONAL_MM = float(np.hypot(36.0, 24.0))
-
-
-@dataclass(frozen=True)
-class Sampler:
-    """Samples per pixel and seed."""
-
-    spp: int = 4
-    seed: int = 0
-
-
-@dataclass(frozen=True, eq=False)
-class Sensor:
-    """A camera with its film and sampler, as a sensor plugin holds them."""
-
-    camera: Perspective
-    film: Film
-    sampler: Sampler
 
 
 def perspective(reader: Reader) -> Sensor:
@@ -106,14 +89,19 @@ def _rigid(reader: Reader) -> np.ndarray:
     return matrix
 
 
+def film_fault(width: int, height: int) -> str:
+    """What is wrong with a film of so many pixels; "" for one that can be rendered."""
+    if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
+        return f"each side of a film has 1 to {MAX_SIDE} pixels, not {width} x {height}"
+    return f"a film of {width} x {height} pixels is too large" if width * height > MAX_PIXELS else ""
+
+
 def hdrfilm(reader: Reader) -> Film:
     """The `hdrfilm` plugin."""
     width = reader.integer("width", Film.width, 1, MAX_SIDE)
     height = reader.integer("height", Film.height, 1, MAX_SIDE)
-    if width * height > MAX_PIXELS:
-        reader.fail(
-            f"a film of {width} x {height} pixels is too large", "width", f"at most {MAX_PIXELS} pixels"
-        )
+    if fault := film_fault(width, height):
+        reader.fail(fault, "width", f"at most {MAX_PIXELS} pixels")
     if reader.has("pixel_format") and reader.string("pixel_format", "rgb") != "rgb":
         reader.fail(
             f"pixel_format '{reader.string('pixel_format', 'rgb')}' is not supported in this version",

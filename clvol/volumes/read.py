@@ -41,6 +41,12 @@ CONVERSIONS = {".nvdb": NANOVDB}
 """Suffixes of volumes that cannot be read, and what makes one of them that can."""
 
 
+def is_volume(path: str | os.PathLike[str]) -> bool:
+    """Whether a name is that of a volume, readable or not, rather than of a scene."""
+    suffix = Path(path).suffix.lower()
+    return suffix in READERS or suffix in CONVERSIONS
+
+
 def read_volume(path: str | os.PathLike[str], grid: str | None = None) -> Grid:
     """Read a volume file; its suffix, in either case, says the format.
 

@@ -257,11 +257,14 @@ def test_options_reach_render_unchanged(scene: str, tmp_path: Path, monkeypatch:
     monkeypatch.setattr(clvol, "render", render)
     options = ["--time", "2", "--seed", "7", "--device", "pocl", "--majorant", "grid", "--technique", "delta"]
     options += ["--probability", "history", "--majorant-scale", "1.25", "--aov", "cells", "--aov", "null"]
+    options += ["--size", "64x48", "--sensor", "0"]
     outcome = run("render", scene, "-o", tmp_path / "a.exr", *options)
     assert outcome.exit_code == 0, outcome.output
     del seen["progress"]
     assert seen == {
         "profile": False,
+        "sensor": 0,
+        "size": (64, 48),
         "spp": None,
         "samples": None,
         "time_limit": 2.0,
