@@ -91,11 +91,20 @@ INLINE uint2 stream_pair(Stream *stream)
 
 DEFINE_MINUS_LOG(minus_log, float)
 
+/* A normal number, whose bits are `bits`, is (1 + r) 2^exponent: returns r, from sqrt_of(1/2) - 1 to sqrt_of(2) - 1. */
+INLINE float split_of_bits(uint bits, float *exponent)
+{
+    const uint shifted = bits - 0x3F3504F3u;
+    *exponent = (float)((int)shifted >> 23);
+    return as_float((shifted & 0x007FFFFFu) + 0x3F3504F3u) - 1.0f;
+}
+
 /* -ln(x) of a normal number, whose bits are `bits`. */
 INLINE float minus_log_of_bits(uint bits)
 {
-    const uint shifted = bits - 0x3F3504F3u; /* mantissa into [sqrt_of(1/2), sqrt_of(2)) */
-    return minus_log(as_float((shifted & 0x007FFFFFu) + 0x3F3504F3u) - 1.0f, (float)((int)shifted >> 23));
+    float exponent;
+    const float r = split_of_bits(bits, &exponent);
+    return minus_log(r, exponent);
 }
 
 /* Exponential variate with mean 1 from a full 32-bit number: -ln(1 - (k+1/2)/2^32), with full relative
@@ -106,11 +115,9 @@ INLINE float exponential_variate(uint k)
     const bool lower_half = k < 0x80000000u;
     const float tail = (float)(lower_half ? k : ~k) * 0x1p-32f + 0x1p-33f; /* distance to the nearer end */
     const bool near_one = lower_half && tail < 0.29f;
-    const uint bits = as_uint(lower_half ? 1.0f - tail : tail);
-    const uint shifted = bits - 0x3F3504F3u; /* mantissa into [sqrt_of(1/2), sqrt_of(2)) */
-    const float exponent = near_one ? 0.0f : (float)((int)shifted >> 23);
-    const float r = near_one ? -tail : as_float((shifted & 0x007FFFFFu) + 0x3F3504F3u) - 1.0f;
-    return minus_log(r, exponent);
+    float exponent;
+    const float r = split_of_bits(as_uint(lower_half ? 1.0f - tail : tail), &exponent);
+    return minus_log(near_one ? -tail : r, near_one ? 0.0f : exponent);
 }
 
 /* Whether an event of rate `part` happens among a total rate `part + rest`, at full resolution for
