@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.lab.agreement import ROUNDING
+from clvol.lab.digits import with_ends
 from clvol.lab.statistics import Interval, bootstrap, regions, round_variance
 from clvol.rendering.outcome import LARGE_WEIGHT, make_result
 
@@ -96,7 +97,7 @@ class Relative(Interval):
     """An efficiency over another's, with its 95 % interval."""
 
     def __str__(self) -> str:
-        return f"{self.value:.2f} ({self.low:.2f} to {self.high:.2f})"
+        return with_ends(self)
 
 
 def blind(one: Candidate, other: Candidate) -> bool:

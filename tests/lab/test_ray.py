@@ -20,6 +20,7 @@ import clvol
 from clvol.cli.main import main
 from clvol.device import programs
 from clvol.errors import OptionError
+from clvol.lab.digits import with_error
 from clvol.lab.ray.plot import draw
 from clvol.lab.ray.walks import OUTCOME, read_walk
 from clvol.planning import registry
@@ -265,6 +266,24 @@ def test_the_figure_shows_every_choice(view):
     for one in view.watched:
         kind = "collisions" if one.family == "technique" else "transmittance"
         assert any(title.startswith(f"{one.name}  ({kind}") for title in titles)
+
+
+def test_the_exact_depth_has_the_digits_that_are_right(view, chromatic):
+    """Its error, told from longer steps, covers what is left to a finer rule in float64."""
+    for shown, field, scale in ((view, tinted(), 3.0), (chromatic, coloured()[..., 1], 40.0)):
+        finer = (np.arange(1 << 18) + 0.5) / (1 << 18) * shown.place.length
+        depth = scale * trilinear(field, points_along(shown, finer)).mean() * shown.place.length
+        channel, error = shown.channel, shown.depth_error[shown.channel]
+        assert abs(shown.depth[channel, -1] - depth) < 2 * error < 1e-4 * depth
+        assert float(shown.exact) == pytest.approx(np.exp(-depth), rel=3 * error)
+        assert f"transmittance {shown.exact}" in shown.summary()[0]
+
+
+def test_means_over_walks_have_the_digits_of_their_errors(view):
+    for one, line in zip(view.watched, view.summary()[1:], strict=True):
+        mean, error = one.transmitted(view.channel)
+        assert f"{one.label}: transmittance {with_error(mean, error)}, " in line or "every walk" in line
+        assert f"{one.per_walk('lookups')} look-ups" in line
 
 
 # -- what a user meets --------------------------------------------------------------------------------

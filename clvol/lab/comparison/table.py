@@ -11,7 +11,7 @@ import textwrap
 from typing import TYPE_CHECKING
 
 from clvol.lab.comparison.figures import COSTS, Figures
-from clvol.lab.comparison.words import times
+from clvol.lab.digits import with_ends
 
 if TYPE_CHECKING:
     from clvol.lab.comparison.findings import Findings
@@ -68,7 +68,7 @@ def _cell(figures: Figures, cost: str, baseline: str) -> str:
     e = figures.efficiency[cost]
     if figures.label == baseline:
         return "1 (baseline)"
-    return times(e.ratio).replace(" to ", "–") + (" *" if e.significant else "")
+    return with_ends(e.ratio).replace(" to ", "–") + (" *" if e.significant else "")
 
 
 def text_table(findings: Findings, width: int | None = None) -> str:

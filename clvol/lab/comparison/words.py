@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 from clvol.lab.comparison.figures import ALPHA, COSTS, LEVEL, Efficiency, Figures
 from clvol.lab.comparison.measure import is_low_discrepancy
+from clvol.lab.digits import with_ends
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from clvol.lab.comparison.findings import Findings
-    from clvol.lab.statistics import Interval
 
 _HEAVY = 0.5
 """A round with more of the squared error than this, and than four times its share, is not like the others."""
@@ -25,13 +25,6 @@ class Sentence:
 
     kind: str
     text: str
-
-
-def times(interval: Interval) -> str:
-    """A ratio with its interval: "2.31 (2.05 to 2.60)"; "unknown" where it is."""
-    if not math.isfinite(interval.value):
-        return "unknown"
-    return f"{interval.value:.3g} ({interval.low:.3g} to {interval.high:.3g})"
 
 
 def sentences(findings: Findings) -> list[Sentence]:
@@ -55,7 +48,7 @@ def _efficiency(findings: Findings, cost: str) -> Iterator[str]:
     for label, e in sorted(others.items(), key=lambda item: -item[1].ratio.value):
         at = f"{spp[label]}" if spp[label] == spp[base] else f"{spp[label]} against {spp[base]}"
         yield (
-            f"By {COSTS[cost]}, {label} is {times(e.ratio)} times as efficient as {base} "
+            f"By {COSTS[cost]}, {label} is {with_ends(e.ratio)} times as efficient as {base} "
             f"at {at} spp a render{_significance(e)}."
         )
 

@@ -136,7 +136,7 @@ def _transmittance(axes: Axes, view: WatchedRay, watched: list[Watched]) -> None
             axes.plot(start + edges, control, label="control's transmittance", **CONTROL)
             residual = exact / np.maximum(control, 1e-300)
             axes.plot(start + edges, residual, color=GREEN, ls=":", lw=1.8, label="residual's transmittance")
-    label = f"exact T: {exact[-1]:.3g} at the end"
+    label = f"exact T: {view.exact} at the end"
     axes.plot(start + edges, exact, color=BLACK, lw=2.2, label=label, zorder=4)
     axes.set_title("Transmittance from the medium's entry", loc="left", fontsize=11)
     axes.set_ylabel("transmittance")

@@ -11,6 +11,7 @@ import numpy as np
 
 from clvol.base.extras import need_matplotlib
 from clvol.base.output_files import check_file, output_suffix, write_file
+from clvol.lab.digits import up_to_error
 from clvol.lab.ray.walks import Watched, format_estimate
 from clvol.lab.ray.watched import WatchedRay
 from clvol.version import __version__
@@ -35,17 +36,17 @@ class RayView(WatchedRay):
 
     def summary(self) -> list[str]:
         """A line on the ray and one on each technique and transmittance."""
-        exact = self.transmittance[self.channel, -1]
+        depth, error = self.depth[self.channel, -1], self.depth_error[self.channel]
         lines = [
             f"{self.medium}: {self.place.length:.4g} long, {self.place.distance:.4g} from the camera; "
-            f"optical depth {self.depth[self.channel, -1]:.4g}, transmittance {exact:.4g}"
+            f"optical depth {up_to_error(depth, error)}, transmittance {self.exact}"
         ]
         for watched in self.watched:
             mean, error = watched.transmitted(self.channel)
-            lookups, tentative = watched.mean("lookups"), watched.mean("tentative")
             lines.append(
                 f"  {watched.label}: transmittance {format_estimate(mean, error)}, "
-                f"{lookups:.4g} look-ups and {tentative:.4g} tentative collisions per walk"
+                f"{watched.per_walk('lookups')} look-ups and {watched.per_walk('tentative')} tentative "
+                "collisions per walk"
             )
         return lines + [f"  {note}" for note in self.notes]
 

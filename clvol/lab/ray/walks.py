@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from clvol.lab.digits import up_to_error, with_error
+
 TENTATIVE, LOOKUP, NULL, REAL, ESTIMATE = range(5)
 """Kinds of events, as cl/ray/recorder.h numbers them."""
 OUTCOME = np.dtype(
@@ -32,13 +34,17 @@ CELL = np.dtype(
     ]
 )
 """A cell of the majorant along the ray, as cl/ray/tables.cl writes it; nan for what the walk does not use."""
+ROUNDING = 1e-5
+"""Relative error of what walks carry in float32 through many collisions."""
 UNNAMED = "the medium"
 """What a medium without a name is called."""
 
 
 def format_estimate(mean: float, error: float) -> str:
-    """An estimate with its standard error; without where every walk gave the same."""
-    return f"{mean:.3g} ± {error:.1g}" if error > 0 else f"{mean:.3g} from every walk"
+    """An estimate with its standard error; without where every walk gave the same, but for rounding."""
+    if error > ROUNDING * abs(mean):
+        return with_error(mean, error)
+    return f"{up_to_error(mean, ROUNDING * abs(mean))} from every walk"
 
 
 @dataclass
@@ -139,6 +145,12 @@ class Watched:
     def mean(self, count: str) -> float:
         """Mean over the walks of one of the counts of `OUTCOME`."""
         return float(self.outcomes[count].mean(dtype=np.float64))
+
+    def per_walk(self, count: str) -> str:
+        """The same with its standard error, in words."""
+        values = self.outcomes[count].astype(np.float64)
+        error = values.std(ddof=1) / math.sqrt(len(values))
+        return with_error(values.mean(), error) if error > 0 else f"{values.mean():g}"
 
     def control(self, channel: int) -> np.ndarray | None:
         """What it subtracts in each cell, (n,), or None."""
