@@ -36,7 +36,8 @@ Examples:
 def info(file: str, grid: str | None, definitions: tuple[tuple[str, str], ...], **choices: Any) -> None:
     """Say what a volume or a scene contains.
 
-    FILE is a volume (.vdb, .vol, .npy, .npz): its grids, sizes, boxes, values and memory; or a scene
+    FILE is a volume (.vdb, .vol, .npy, .npz, medical images, .tif, .h5 and others, see the formats in the
+    documentation): its grids, sizes, boxes, values and memory; or a scene
     (.xml): its camera, film, media and lights, and the plan of its render: the choices that are in force
     and why, its features, its stages and what is compiled.  The choices below are those of `clvol render`.
     """

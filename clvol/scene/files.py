@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from clvol.base.files import other_kind
 from clvol.errors import SceneError
+from clvol.volumes.read import split_address
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,8 +16,10 @@ if TYPE_CHECKING:
     from clvol.scene.reader import Reader
 
 
-def find(name: str, folders: Sequence[Path], where: str) -> Path:
+def find(name: str, folders: Sequence[Path], where: str, folder_too: bool = False) -> Path:
     """The first of `folders` that holds file `name`, joined with it; an absolute `name` as it is.
+
+    `folder_too`: it may be a folder.
 
     Raises
     ------
@@ -25,7 +28,8 @@ def find(name: str, folders: Sequence[Path], where: str) -> Path:
     """
     for folder in folders:
         path = folder / name
-        if os.path.isfile(path):  # false, unlike Path.is_file, for a name too long for the system
+        # false, unlike Path.is_file, for a name too long for the system
+        if os.path.isfile(path) or (folder_too and os.path.isdir(path)):
             return path
         if kind := other_kind(path):
             raise SceneError(f"'{path}' is {kind}, not a file", where)
@@ -37,3 +41,12 @@ def find(name: str, folders: Sequence[Path], where: str) -> Path:
 def find_parameter(reader: Reader, name: str) -> Path:
     """The file that string parameter `name`, which must be given, names."""
     return find(reader.string(name, ""), reader.node.folders, reader.node.place(name))
+
+
+def find_volume(reader: Reader, name: str) -> tuple[Path, str | None]:
+    """The file or folder of the volume that string parameter `name`, which must be given, names.
+
+    And the array in it that it names, as "scan.h5:/density" does, else None.
+    """
+    file, grid = split_address(reader.string(name, ""))
+    return find(file, reader.node.folders, reader.node.place(name), folder_too=True), grid

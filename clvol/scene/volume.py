@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.scene.files import find_parameter
+from clvol.scene.files import find_parameter, find_volume
 from clvol.scene.records import ConstVolume, GridVolume, Volume
 from clvol.scene.transforms import scale, translate
 from clvol.volumes import dense_from_array, read_vdb, read_volume
 from clvol.volumes.files import place
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
+from clvol.volumes.labelled import grid_from_labelled, is_labelled
 
 if TYPE_CHECKING:
     from clvol.scene.reader import Reader
@@ -49,7 +50,8 @@ def gridvolume(reader: Reader) -> Volume:
     """The `gridvolume` plugin: a file, or an array [z, y, x] or [z, y, x, channel].
 
     Samples sit at the centres of equal cells of the unit cube (or of the file's own box) under
-    `to_world`; those of a .vdb file sit where a `vdbvolume` has them.
+    `to_world`; those of a .vdb file sit where a `vdbvolume` has them, and those of any other file that places
+    its samples, as medical images do, where it says, under `to_world` as well.
     """
     reader.ignore(accel=bool, raw=bool)
     wrap_mode = reader.string("wrap_mode", "clamp", WRAP_MODES)
@@ -67,12 +69,18 @@ def gridvolume(reader: Reader) -> Volume:
         return _sparse_volume(reader, grid)
     size = np.array(grid.values.shape[2::-1], dtype=np.float64)
     local = np.eye(4)
-    if use_box:
+    if grid.index_to_world is not None:
+        if reader.has("use_grid_bbox") and not use_box:
+            reader.fail("this grid always lies where its file says", "use_grid_bbox", "use to_world")
+    elif use_box:
         low, high = np.asarray(grid.box, dtype=np.float64)
         if not (np.isfinite(grid.box).all() and (high > low).all()):
             reader.fail(f"the file's bounding box {grid.box.tolist()} has no volume", "use_grid_bbox")
         local = translate(low) @ scale(high - low)
-    index_to_world = reader.transform() @ local @ scale(1 / size) @ translate(0.5)
+    if grid.index_to_world is None:
+        index_to_world = reader.transform() @ local @ scale(1 / size) @ translate(0.5)
+    else:
+        index_to_world = reader.transform() @ grid.index_to_world
     filter_type = reader.string("filter_type", "trilinear", FILTER_TYPES)
     return GridVolume(
         grid, index_to_world, np.full(3, -0.5), size - 0.5, filter_type, wrap_mode, source=grid.source
@@ -95,8 +103,14 @@ def _grid(reader: Reader) -> Grid:
     if sources != ["filename"]:
         if name is not None:
             reader.fail(f"an array has no grid named '{name}'", "grid", "the name goes with a filename")
-        return dense_from_array(reader.array(sources[0]), source=reader.node.place(sources[0]))
-    path = find_parameter(reader, "filename")
+        where = reader.node.place(sources[0])
+        if is_labelled(reader.node[sources[0]]):
+            return grid_from_labelled(reader.raw(sources[0]), where)
+        return dense_from_array(reader.array(sources[0]), source=where)
+    path, inside = find_volume(reader, "filename")
+    if inside is not None and name is not None:
+        reader.fail(f"the filename names an array itself, '{inside}'", "grid", "give one of them")
+    name = inside if name is None else name
     grids = reader.library.grids
     if name is None and path.suffix.lower() == ".vdb":
         name = "density"

@@ -18,12 +18,17 @@ class DenseGrid:
     `values` is float32 (nz, ny, nx, channels), C order, read-only; sample (i, j, k) is
     ``values[k, j, i]``.  `box` is the file's own bounding box, float64
     (2, 3) in x, y, z order (the unit cube where a format has none).
+
+    `index_to_world`, float64 (4, 4) for column vectors, is the file's own transform, and `unit` that of its
+    positions, as "mm"; None of files and arrays that say nothing of where their samples lie.
     """
 
     values: np.ndarray
     box: np.ndarray
     name: str = ""
     source: str = ""
+    index_to_world: np.ndarray | None = None
+    unit: str = ""
 
     def __repr__(self) -> str:
         depth, height, width, channels = self.values.shape

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.errors import VolumeError
+from clvol.volumes import containers
 from clvol.volumes.files import TRUNCATED, open_binary
 from clvol.volumes.numpy_files import ZIP_ERRORS
 from clvol.volumes.vdb import list_vdb
@@ -53,7 +54,20 @@ def _npz(path: str | os.PathLike[str]) -> list[Listed]:
             raise VolumeError(f"the archive is damaged ({error})", str(path), TRUNCATED) from None
 
 
-LISTERS: dict[str, Callable[[str | os.PathLike[str]], list[Listed]]] = {".vdb": _vdb, ".npz": _npz}
+def _hdf5(path: str | os.PathLike[str]) -> list[Listed]:
+    return [Listed(name) for name in containers.list_hdf5(path)]
+
+
+def _zarr(path: str | os.PathLike[str]) -> list[Listed]:
+    return [Listed(name) for name in containers.list_zarr(path)]
+
+
+LISTERS: dict[str, Callable[[str | os.PathLike[str]], list[Listed]]] = {
+    ".vdb": _vdb,
+    ".npz": _npz,
+    **dict.fromkeys(containers.HDF5_SUFFIXES, _hdf5),
+    containers.ZARR_SUFFIX: _zarr,
+}
 """By suffix, for formats with several grids in a file; files of others hold one without a name."""
 
 

@@ -1,12 +1,14 @@
-"""Any supported volume file, by its suffix."""
+"""Any supported volume, by its suffix or by what the folder holds: the one way to a grid from a file."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from clvol.base.files import other_kind
 from clvol.errors import VolumeError
+from clvol.volumes import containers, itk, tiff, vti
 from clvol.volumes.files import NANOVDB
 from clvol.volumes.numpy_files import read_numpy
 from clvol.volumes.vdb import read_vdb
@@ -34,30 +36,67 @@ READERS: dict[str, Callable[[str | os.PathLike[str], str | None], Grid]] = {
     ".vol": _vol,
     ".npy": read_numpy,
     ".npz": read_numpy,
+    **dict.fromkeys(itk.SUFFIXES, itk.read_itk),
+    **dict.fromkeys(tiff.SUFFIXES, tiff.read_tiff),
+    **dict.fromkeys(containers.HDF5_SUFFIXES, containers.read_hdf5),
+    vti.SUFFIX: vti.read_vti,
 }
 """Suffix -> reader of a file and of the grid that is named, if any."""
-SUFFIXES = tuple(READERS)
+SUFFIXES = (*READERS, containers.ZARR_SUFFIX)
 CONVERSIONS = {".nvdb": NANOVDB}
 """Suffixes of volumes that cannot be read, and what makes one of them that can."""
 
+_INSIDE = re.compile(
+    rf"(?P<file>.*({'|'.join(map(re.escape, (*containers.HDF5_SUFFIXES, containers.ZARR_SUFFIX)))}))"
+    r":(?P<grid>.*)",
+    re.IGNORECASE | re.DOTALL,
+)
+
+
+def volume_suffix(path: str | os.PathLike[str]) -> str:
+    """The suffix that says a file's format, in lower case: the last, or ".nii.gz"."""
+    name = Path(path).name.lower()
+    return next((s for s in SUFFIXES if s.count(".") > 1 and name.endswith(s)), Path(name).suffix)
+
+
+def split_address(address: str) -> tuple[str, str | None]:
+    """File or folder, and grid, of "scan.h5:/entry/density"; any other address has no grid."""
+    found = _INSIDE.fullmatch(address)
+    return (found["file"], found["grid"]) if found else (address, None)
+
 
 def is_volume(path: str | os.PathLike[str]) -> bool:
-    """Whether a name is that of a volume, readable or not, rather than of a scene."""
-    suffix = Path(path).suffix.lower()
-    return suffix in READERS or suffix in CONVERSIONS
+    """Whether a name is a volume's, readable or not, rather than a scene's: by its suffix, or a folder."""
+    name, inside = split_address(str(path))
+    suffix = volume_suffix(name)
+    return inside is not None or suffix in SUFFIXES or suffix in CONVERSIONS or Path(name).is_dir()
 
 
 def read_volume(path: str | os.PathLike[str], grid: str | None = None) -> Grid:
-    """Read a volume file; its suffix, in either case, says the format.
+    """Read a volume; the suffix of a file, in either case, says the format.
 
     Parameters
     ----------
-    path : .vdb, .vol, .npy or .npz.
-    grid : the grid of a .vdb (default "density") or the array of a .npz (default the only one).
+    path : .vdb, .vol, .npy, .npz; with the extra `science` .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, .dcm,
+        .tif, .h5, .nc, .zarr, .vti, and a folder of DICOM slices.  "scan.h5:/density" names an array inside.
+    grid : the grid of a .vdb (default "density"), the array of a .npz, .h5, .zarr or .vti (default the only
+        one), the series of a DICOM folder; or of an array of more axes "[3]", its part.
 
-    Raises VolumeError as the reader of the format does, and for other suffixes.
+    Raises VolumeError as the reader of the format does, and for other suffixes; OptionError where the package
+    that reads the format is missing.
     """
-    suffix = Path(path).suffix.lower()
+    name, inside = split_address(str(path))
+    if inside is not None:
+        if grid is not None:
+            raise VolumeError(f"names an array itself, and grid {grid!r} is given", str(path), "give one")
+        path, grid = name, inside
+    folder, suffix = Path(path), volume_suffix(path)
+    if suffix == containers.ZARR_SUFFIX or (folder.is_dir() and containers.is_zarr(folder)):
+        if not folder.is_dir():
+            raise VolumeError("no such folder", str(path))
+        return containers.read_zarr(path, grid)
+    if folder.is_dir():
+        return itk.read_dicom(path, grid)
     if suffix not in READERS:
         listed = f"{', '.join(SUFFIXES[:-1])} and {SUFFIXES[-1]}"
         if kind := other_kind(path):
