@@ -26,7 +26,7 @@ FOLDER.mkdir(parents=True, exist_ok=True)
 
 # %% [markdown]
 # ## A picture
-# Keywords fill the scene's `<default>`s. A result shows itself as a picture, tone-mapped; its pixels are in
+# Keywords fill the scene's `<default>`s. A result shows itself as a picture; its pixels are in
 # `result.image`, linear.
 
 # %%

@@ -17,12 +17,12 @@ from clvol.cli.options import (
     definitions_option,
     device_option,
     family_options,
-    finite,
     majorant_scale_option,
     positive_option,
     quiet_option,
     step_option,
 )
+from clvol.cli.pictures import Shown, picture_options, write_views
 from clvol.errors import Error
 
 if TYPE_CHECKING:
@@ -49,14 +49,15 @@ Examples:
 
 
 class RenderCommand(ExplainedCommand):
-    """As `ExplainedCommand`, and what the pictures that --aov adds show."""
+    """As `ExplainedCommand`, and what the pictures that --aov adds show, and which views there are."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write a section of the pictures before the rest."""
+        """Write a section of each before the rest."""
         from clvol.planning.registry import AOVS
 
         with formatter.section("--aov"):
             formatter.write_dl(list(AOVS.items()))
+        write_views(formatter)
         super().format_epilog(ctx, formatter)
 
 
@@ -69,7 +70,8 @@ class RenderCommand(ExplainedCommand):
     metavar="FILE",
     multiple=True,
     required=True,
-    help="Picture to write, .exr or .png; may be given several times.",
+    help="Picture to write: .exr has everything; .png, .jpg, .tif, .hdr and others the picture. "
+    "May be given several times.",
 )
 @family_options(pilot=True)
 @majorant_scale_option
@@ -106,14 +108,7 @@ class RenderCommand(ExplainedCommand):
 @click.option("--seed", type=click.IntRange(min=0), help="Same seed, same bits; the scene's own by default.")
 @device_option
 @definitions_option
-@click.option(
-    "--exposure",
-    type=float,
-    default=0.0,
-    callback=finite,
-    metavar="STOPS",
-    help="Brighten a .png by so many stops.",
-)
+@picture_options
 @click.option(
     "-v",
     "--verbose",
@@ -133,7 +128,6 @@ def render(
     spp: int | None,
     time_limit: float | None,
     definitions: tuple[tuple[str, str], ...],
-    exposure: float,
     verbose: bool,
     profile: bool,
     trace: str | None,
@@ -146,20 +140,23 @@ def render(
     """
     from clvol.base.progress import RichProgress, error_console
     from clvol.cli.profile import profile_lines
+    from clvol.picture.formats import check_holds
     from clvol.picture.saving import check_disk, save_all
     from clvol.scene.views import viewed
 
     if spp is not None and time_limit is not None:
         raise click.UsageError("give --spp or --time, not both")
-    _check_files(scene, outputs, trace, exposure, bool(options["aov"]))
+    shown = Shown.taken(options)
+    _check_files(scene, outputs, trace, shown, bool(options["aov"]))
     console = error_console()
     with logging_to(console, verbose):
         import clvol
 
         loaded = clvol.load_file(scene, **dict(definitions))
-        pixels = math.prod(viewed(loaded, options["sensor"], options["size"]).film.window[2:])
+        film = viewed(loaded, options["sensor"], options["size"]).film
         for output in outputs:
-            check_disk(output, pixels, len(options["aov"]))
+            check_holds(output, alpha=film.has_alpha, size=film.window[2:])
+            check_disk(output, math.prod(film.window[2:]), len(options["aov"]))
         piloted = options["technique"] == "auto:pilot"
         if piloted and not quiet and not console.is_terminal:
             from clvol.lab.repeat import announcement
@@ -172,7 +169,7 @@ def render(
             from clvol.lab.repeat import with_definitions
 
             result.metadata["repeat"] = with_definitions(result.metadata["repeat"], dict(definitions))
-        failures = save_all(lambda suffix: result.encode(suffix, exposure), outputs)
+        failures = save_all(shown.encoder(result), outputs)
         if trace is not None and result.profile:
             failures |= _save_trace(result.profile, trace)
     written = [output for output in outputs if output not in failures]
@@ -188,17 +185,13 @@ def render(
     exit_by(result.stats["interrupted"])
 
 
-def _check_files(scene: str, outputs: Sequence[str], trace: str | None, exposure: float, aovs: bool) -> None:
+def _check_files(scene: str, outputs: Sequence[str], trace: str | None, shown: Shown, aovs: bool) -> None:
     """Refuse what could not be written after a long render, and what nothing would be written of."""
     from clvol.picture.profile import check_trace
-    from clvol.picture.saving import check_picture
 
-    for output in outputs:
-        check_picture(output, exposure)
+    shown.check(outputs)
     if aovs and not any(output.lower().endswith(".exr") for output in outputs):
         raise click.UsageError("--aov needs an .exr to write to")
-    if exposure and not any(output.lower().endswith(".png") for output in outputs):
-        raise click.UsageError("--exposure needs a .png to write to: an .exr is as bright as the scene")
     if trace is not None:
         check_trace(trace)
     _check_distinct(scene, outputs if trace is None else (*outputs, trace))

@@ -71,7 +71,7 @@ def merge(results: Iterable[Result]) -> Result:
         stats=_merged_stats([result.stats for result in results]),
         metadata=_merged_metadata([result.metadata for result in results], sum(counts)),
     )
-    merged.ranges = ranges
+    merged.ranges, merged.component_format = ranges, results[0].component_format
     merged.metadata |= said_ranges(ranges)
     return merged
 

@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clvol.errors import OptionError
-from clvol.picture import image_io
+from clvol.picture.encoding import encode_result
 from clvol.picture.estimate import Estimate, error_bias
+from clvol.picture.image_io import ALPHA
 from clvol.picture.saving import check_picture, save_all
+from clvol.picture.view_transform import View
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -78,6 +80,8 @@ class Result:
         The same as `samples`, but exact where merged ranges leave gaps.
     profile : `clvol.picture.profile.Profile` or None
         Where the time went, of a render that was asked for it.
+    component_format : str or None
+        What the scene asks the numbers of its files to be, as "float16".
     """
 
     image: np.ndarray
@@ -89,6 +93,7 @@ class Result:
     estimate: Estimate
     ranges: Ranges = ()
     profile: Profile | None = None
+    component_format: str | None = None
 
     def __post_init__(self) -> None:
         self.ranges = self.ranges or (self.samples,)
@@ -159,30 +164,64 @@ class Result:
         """The picture as a PNG, tone-mapped: how a notebook shows a result."""
         return self.encode(".png")
 
-    def encode(self, suffix: str, exposure: float = 0.0) -> bytes:
-        """The whole file: a tone-mapped .png, or an .exr with picture, variance and every AOV."""
-        if suffix == ".png":
-            return image_io.encode_png(self.image, self.metadata, exposure)
-        channels: dict[str, np.ndarray] = {}
-        for name, image in [("", self.image), ("variance", self.variance), *self.aovs.items()]:
-            channels |= image_io.split_channels(name, image)
-        return image_io.encode_exr(channels, self.metadata | {"dof": self.dof})
+    @property
+    def alpha(self) -> np.ndarray | None:
+        """How opaque the picture is, float32 (height, width), where the film has it; else None.
 
-    def save(self, path: str | PathLike[str], exposure: float = 0.0) -> None:
-        """Write the picture as .exr (everything, linear) or .png (tone-mapped), by the path's suffix.
+        The share of paths that meet something.  The image is multiplied by it.
+        """
+        return self.aovs.get(ALPHA)
 
-        An EXR holds R, G, B, variance.R/G/B and every AOV as float32 channels of one part.  A PNG is
-        raised by `exposure` stops and goes through `clvol.picture.image_io.tone_map`.  Both carry the
-        metadata.  An earlier file of that name is replaced only once the new one is complete.
+    def encode(
+        self,
+        suffix: str,
+        exposure: float | str = 0.0,
+        *,
+        display: str | None = None,
+        view_transform: str | None = None,
+        component_format: str | None = None,
+    ) -> bytes:
+        """The whole file that `save` would write under a name with this suffix."""
+        return encode_result(self, suffix, View(exposure, display, view_transform), component_format)
+
+    def save(
+        self,
+        path: str | PathLike[str],
+        exposure: float | str = 0.0,
+        *,
+        display: str | None = None,
+        view_transform: str | None = None,
+        component_format: str | None = None,
+    ) -> None:
+        """Write the picture, in the format that the path's suffix says (`clvol.picture.formats`).
+
+        An EXR holds R, G, B, variance.R/G/B and every AOV as channels of one part; with alpha it is A, which
+        colours are multiplied by.  Formats of floats (.hdr, .pfm, .tif with float32) hold linear radiance.
+        The others hold what a display shows, through a view of the colour configuration: colours are divided
+        by alpha.  All carry the metadata that they have a place for.  An earlier file of that name is
+        replaced only once the new one is complete.
+
+        Parameters
+        ----------
+        exposure
+            Stops by which what a display shows is brighter, or "auto" (`clvol.picture.exposure`).
+        display, view_transform
+            Of the colour configuration, ACES or the one that the environment variable OCIO names: their names
+            or parts of them; its defaults where None.
+        component_format
+            "uint8", "uint16", "float16" or "float32", where the format can hold it.
 
         Raises
         ------
         OptionError
-            Unknown suffix, impossible exposure, or a folder that is missing or cannot be written to; or a
-            file that failed, as on a full disk: the picture is then kept where the message says.
+            Unknown suffix, display or view, impossible exposure, or what the format cannot hold; a folder
+            that is missing or cannot be written to; or a file that failed, as on a full disk: the picture is
+            then kept where the message says.
         """
-        check_picture(path, exposure)
-        for failure in save_all(lambda suffix: self.encode(suffix, exposure), [path]).values():
+        view = View(exposure, display, view_transform)
+        size = self.image.shape[1], self.image.shape[0]
+        check_picture(path, view, component_format, alpha=self.alpha is not None, size=size)
+        for failure in save_all(lambda s: encode_result(self, s, view, component_format), [path]).values():
             raise failure
 
 

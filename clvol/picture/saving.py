@@ -17,27 +17,53 @@ from clvol.base.output_files import (
     write_file,
 )
 from clvol.errors import Error, OptionError
-from clvol.picture import image_io
+from clvol.picture.formats import (
+    FORMATS,
+    SUFFIXES,
+    check_component,
+    check_holds,
+    check_made,
+    component_of,
+    is_linear,
+)
+from clvol.picture.view_transform import View
 
 log = logging.getLogger("clvol")
-SUFFIXES = (".exr", ".png")
 Encode = Callable[[str], bytes]
 """The whole file of a picture, by the suffix of its name."""
 _SQUEEZED = 32
 """By how much compression may shrink a picture; noise hardly does by 2."""
 
 
-def check_picture(path: StrPath, exposure: float = 0.0) -> None:
-    """Raise OptionError now for what `save` would refuse after a long render."""
-    output_suffix(path, SUFFIXES)
-    image_io.check_exposure(exposure)
+def check_picture(
+    path: StrPath,
+    view: View | None = None,
+    component: str | None = None,
+    *,
+    alpha: bool = False,
+    size: tuple[int, int] | None = None,
+) -> None:
+    """Raise OptionError now for what `save` would refuse after a long render.
+
+    view : how the picture is to be shown.  component : what numbers are to be.  size : width and height,
+    where they are known, and `alpha`: whether it has alpha.
+    """
+    suffix = output_suffix(path, SUFFIXES)
+    if component is not None:
+        check_component(suffix, component)
+    if not is_linear(component_of(suffix, component)):
+        (view or View()).resolved()
+    if size is not None:
+        check_holds(path, alpha=alpha, size=size)
+    check_made(path)
     check_file(path)
 
 
 def check_disk(path: StrPath, pixels: int, aovs: int) -> None:
     """OptionError where a picture of so many pixels cannot fit on the disk, a warning where it may not."""
-    planes = 8 + 3 * aovs  # colours, their variances, look-ups and samples
-    most = pixels * (4 * planes if output_suffix(path, SUFFIXES) == ".exr" else 3)
+    suffix = output_suffix(path, SUFFIXES)
+    planes = 8 + 3 * aovs if FORMATS[suffix].layers else 3  # colours, their variances, look-ups and samples
+    most = pixels * planes * (4 if is_linear(component_of(suffix)) else 1)
     folder = real(path).parent
     try:
         check_room(folder, str(path), most)
@@ -57,7 +83,7 @@ def save_all(encode: Encode, paths: Sequence[StrPath]) -> dict[StrPath, Error]:
         try:
             suffix = output_suffix(path, SUFFIXES)
             write_file(path, encode(suffix))
-            whole = whole or (str(path) if suffix == ".exr" else "")
+            whole = whole or (str(path) if FORMATS[suffix].layers else "")
         except (Error, OSError, MemoryError) as error:
             failed[path] = getattr(error, "what", "") or str(error) or "out of memory"
     if not failed:

@@ -37,6 +37,7 @@ def make_result(session: Session, first: int, count: int) -> Result:
     result = Result.from_estimate(
         estimate.reshaped(*shape, 3), (first, count), aovs, stats, _metadata(session, first, samples)
     )
+    result.component_format = session.prepared.scene.film.component_format
     _warn_of_unseen(session, result)
     return result
 

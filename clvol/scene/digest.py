@@ -12,10 +12,15 @@ _BLOCKS, _BLOCK_VALUES = 256, 4096
 take seconds."""
 
 
+_APART = ("source", "name", "spp", "seed", "choices", "sensors", "component_format")
+"""Fields that do not tell scenes apart."""
+
+
 def scene_digest(scene: object) -> str:
     """16 hexadecimal digits that depend on every record of the scene.
 
-    All but where it was read from, its sample count, its seed, and the sensors that it is not seen by.
+    All but where it was read from, its sample count, its seed, the sensors that it is not seen by, and what
+    numbers in files are.
     """
     state = hashlib.blake2b(digest_size=8)
     _feed(state, scene)
@@ -34,7 +39,7 @@ def _feed(state: hashlib.blake2b, value: object) -> None:
     elif is_dataclass(value):
         state.update(type(value).__name__.encode())
         for field in fields(value):
-            if field.name not in ("source", "name", "spp", "seed", "choices", "sensors"):
+            if field.name not in _APART:
                 state.update(field.name.encode())
                 _feed(state, getattr(value, field.name))
     elif isinstance(value, tuple | list):

@@ -52,6 +52,8 @@ class Film:
     """Image size in pixels and the filter each pixel is integrated with.
 
     `crop` (x, y, width, height): the part of it that is rendered; None: all.
+    `pixel_format`: "rgb", or "rgba" for a picture with alpha.
+    `component_format`: what colours are in files that hold such, "float16" or "float32"; None: what is usual.
     """
 
     width: int = 768
@@ -59,6 +61,13 @@ class Film:
     rfilter: ReconstructionFilter = ReconstructionFilter()
     sample_border: bool = False
     crop: tuple[int, int, int, int] | None = None
+    pixel_format: str = "rgb"
+    component_format: str | None = None
+
+    @property
+    def has_alpha(self) -> bool:
+        """Whether pictures have alpha."""
+        return self.pixel_format == "rgba"
 
     @property
     def window(self) -> tuple[int, int, int, int]:

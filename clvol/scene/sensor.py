@@ -108,7 +108,9 @@ def hdrfilm(reader: Reader) -> Film:
             "pixel_format",
             "supported: rgb",
         )
-    reader.string("component_format", "float16", ("float16", "float32", "uint32"))
+    component_format = None
+    if reader.has("component_format"):
+        component_format = reader.string("component_format", "float32", ("float16", "float32"))
     reader.ignore(file_format=str, banner=bool, compensate=bool)
     rfilter = reader.only_child("rfilter")
     return Film(
@@ -117,6 +119,8 @@ def hdrfilm(reader: Reader) -> Film:
         reader.build(rfilter) if rfilter else ReconstructionFilter(),
         reader.boolean("sample_border", False),
         _crop(reader, width, height),
+        reader.string("pixel_format", Film.pixel_format, ("rgb", "rgba")),
+        component_format,
     )
 
 

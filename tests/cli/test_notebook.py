@@ -10,18 +10,20 @@ import pytest
 from places import ROOT
 
 from clvol.picture.estimate import Moments
-from clvol.picture.image_io import tone_map
+from clvol.picture.image_io import shown_pixels
 from clvol.picture.result import Result
+from clvol.picture.view_transform import View
 
 
-def test_a_result_shows_itself_as_a_tone_mapped_png(tmp_path):
+def test_a_result_shows_itself_as_a_png(tmp_path):
     image = np.linspace(0, 3, 4 * 6 * 3).reshape(4, 6, 3)
     result = Result.from_estimate(Moments(5 * image, 5 * image**2, 5), (0, 5), {}, {}, {"spp": 5})
     png = result._repr_png_()
     assert png.startswith(b"\x89PNG\r\n\x1a\n")
     (tmp_path / "shown.png").write_bytes(png)
     pixels = oiio.ImageBuf(str(tmp_path / "shown.png")).get_pixels(oiio.UINT8)
-    np.testing.assert_array_equal(pixels, np.rint(255 * tone_map(result.image)).astype(np.uint8))
+    shown = shown_pixels(result.image, None, View().resolved())
+    np.testing.assert_array_equal(pixels, np.rint(255 * shown).astype(np.uint8))
 
 
 @pytest.mark.contract

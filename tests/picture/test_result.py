@@ -14,6 +14,7 @@ from clvol.picture import image_io
 from clvol.picture.estimate import Moments
 from clvol.picture.merging import merge
 from clvol.picture.result import Result, relative_noise
+from clvol.picture.view_transform import View
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -222,32 +223,18 @@ def test_exr_says_how_it_was_made(tmp_path: Path) -> None:
     assert {name: attributes.get(name) for name in expected} == expected
 
 
-# --- PNG and tone mapping --------------------------------------------------------------------------
+# --- PNG -------------------------------------------------------------------------------------------
 
 
-def test_tone_map_leaves_mid_tones_alone_and_never_goes_flat() -> None:
-    linear = np.geomspace(1e-4, 1e4, 400)
-    display = image_io.tone_map(linear)
-    mid = linear <= image_io.SHOULDER
-    srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    np.testing.assert_allclose(display[mid], srgb[mid], rtol=1e-5)
-    bright = (linear > 1) & (linear < 30)
-    assert (np.diff(display[bright]) > 1e-4).all()
-    assert display.max() <= 1
-
-
-def test_exposure_is_in_stops() -> None:
-    np.testing.assert_allclose(image_io.tone_map(np.array([0.1]), 2.0), image_io.tone_map(np.array([0.4])))
-
-
-def test_png_shows_the_tone_mapped_picture_with_metadata_as_text(tmp_path: Path) -> None:
+def test_png_shows_the_picture_with_metadata_as_text(tmp_path: Path) -> None:
     result = make_result(0, 4)
     result.save(tmp_path / "a.PNG")
     channels, attributes = read(tmp_path / "a.PNG")
-    expected = np.rint(255 * image_io.tone_map(result.image[..., 1]))
-    np.testing.assert_array_equal(channels["G"], expected)
+    expected = np.rint(255 * image_io.shown_pixels(result.image, None, View().resolved()))
+    np.testing.assert_array_equal(channels["G"], expected[..., 1])
     assert attributes["technique"] == "delta" and attributes["spp"] == "4"
-    assert attributes["Software"] == "clvol 0.1.0"
+    assert attributes["Software"] == "clvol 0.1.0" and attributes["exposure"] == "0"
+    assert attributes["view_transform"].startswith("ACES 2.0")
 
 
 def test_png_paints_broken_pixels_magenta_and_counts_them(
@@ -265,9 +252,9 @@ def test_png_paints_broken_pixels_magenta_and_counts_them(
 # --- failures --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["a.jpg", "a", "a.exr.gz"])
+@pytest.mark.parametrize("name", ["a.gif", "a", "a.exr.gz"])
 def test_unknown_suffix_is_refused(tmp_path: Path, name: str) -> None:
-    with pytest.raises(OptionError, match=r"\.exr or \.png"):
+    with pytest.raises(OptionError, match=r"name the file \.exr, \.png"):
         make_result(0, 2).save(tmp_path / name)
 
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from clvol.lab.colours import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
 from clvol.lab.comparison.figures import COSTS, Figures, relative_weight
-from clvol.picture.image_io import MAGENTA, tone_map
+from clvol.picture.image_io import shown_pixels
+from clvol.picture.view_transform import View
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -152,11 +153,8 @@ def plain_number(value: float) -> str:
 
 
 def picture(image: np.ndarray) -> bytes:
-    """Linear radiance as a tone-mapped PNG, pixel for pixel; what is not finite in magenta."""
-    broken = ~np.isfinite(image).all(axis=-1)
-    pixels = np.rint(255 * tone_map(np.where(broken[..., None], 0.0, image))).astype(np.uint8)
-    pixels[broken] = MAGENTA
-    return _pixels(pixels)
+    """Linear radiance as a PNG as results are shown, pixel for pixel; what is not finite in magenta."""
+    return _pixels(np.rint(255 * shown_pixels(image, None, View().resolved())).astype(np.uint8))
 
 
 def error_scales(findings: Findings) -> tuple[float, float]:
