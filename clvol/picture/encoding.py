@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 from clvol.picture import image_io
 from clvol.picture.formats import component_of, is_linear
@@ -10,11 +10,28 @@ from clvol.picture.formats import component_of, is_linear
 if TYPE_CHECKING:
     import numpy as np
 
-    from clvol.picture.result import Result
     from clvol.picture.view_transform import View
 
 
-def encode_result(result: Result, suffix: str, view: View, component: str | None = None) -> bytes:
+class Pictured(Protocol):
+    """What a file is made of: `clvol.picture.result.Result`."""
+
+    image: np.ndarray
+    variance: np.ndarray
+    aovs: dict[str, np.ndarray]
+    metadata: dict[str, Any]
+    component_format: str | None
+
+    @property
+    def alpha(self) -> np.ndarray | None:
+        """How opaque it is."""
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom of the variance."""
+
+
+def encode_result(result: Pictured, suffix: str, view: View, component: str | None = None) -> bytes:
     """The whole file: everything there is in an .exr, the picture alone in other formats.
 
     view : how it is shown, in formats of whole numbers.  component : what numbers are, in formats that hold
@@ -31,7 +48,7 @@ def encode_result(result: Result, suffix: str, view: View, component: str | None
     return image_io.encode_display(suffix, result.image, result.alpha, result.metadata, view, numbers)
 
 
-def _channels(result: Result) -> dict[str, np.ndarray]:
+def _channels(result: Pictured) -> dict[str, np.ndarray]:
     """Every picture of a result, plane by plane; alpha beside the colours that are multiplied by it."""
     layers = {"": result.image}
     if result.alpha is not None:
