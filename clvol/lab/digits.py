@@ -47,6 +47,11 @@ def with_ends(interval: Interval) -> str:
     return f"{value} ({low} to {high})"
 
 
+def two_digits(value: float) -> str:
+    """A number with two digits, the last a nought too: "0.20"."""
+    return f"{value:#.2g}".removesuffix(".")
+
+
 def _scale(size: float) -> tuple[float, str]:
     """What to multiply numbers of this size with, and the power of ten that makes up for it, "" for none."""
     if not math.isfinite(size) or _SMALL <= size < _LARGE:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from made_up_comparison import SIZE, MadeUp, measured
 from scipy import stats
 
 import clvol
@@ -18,14 +19,15 @@ from clvol.base.output_files import write_file
 from clvol.cli.main import main
 from clvol.errors import OptionError
 from clvol.lab.comparison.bar import progress_words
-from clvol.lab.comparison.combine import Lineup, open_lineup
+from clvol.lab.comparison.combine import open_lineup
+from clvol.lab.comparison.entrants import Render
 from clvol.lab.comparison.figures import compute_figures
-from clvol.lab.comparison.measure import REFERENCE_SAMPLES, Effort, Measured, measure
+from clvol.lab.comparison.flip import has_flip
+from clvol.lab.comparison.measure import REFERENCE_SAMPLES, Effort, Measured
 from clvol.lab.comparison.plots import plain_number
 from clvol.lab.comparison.reference import Reference, read_reference
 from clvol.lab.comparison.report import as_json, check_folder, write_report
-from clvol.lab.comparison.result import Comparison
-from clvol.lab.comparison.shorter import render_slope, shorter_spp
+from clvol.lab.comparison.shorter import render_slope, shorter_spp, slope_spp
 from clvol.lab.comparison.table import text_table
 from clvol.lab.comparison.words import _slope
 from clvol.lab.names import names_asked, plural
@@ -39,7 +41,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 FALSE_ALARM = 1e-4
-SIZE = 16
 CUBE = """<scene version="3.0.0">
   <sensor type="perspective"><float name="fov" value="35"/>
     <transform name="to_world"><lookat origin="0.5,0.5,-1.4" target="0.5,0.5,0.5" up="0,1,0"/></transform>
@@ -69,41 +70,6 @@ def scene_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def film_only() -> SimpleNamespace:
     """What a reference without a digest is compared with."""
     return SimpleNamespace(film=SimpleNamespace(window=(0, 0, SIZE, SIZE)))
-
-
-class MadeUp:
-    """A trial that renders 1 + bias + noise of variance 1 / spp; a look-up a sample, a second for `rate`."""
-
-    def __init__(self, rate: float = 1e3, bias: float = 0.0, sigma: float = 1.0, ctrl_c: int = 10**9):
-        self.rate, self.bias, self.sigma, self.ctrl_c = rate, bias, sigma, ctrl_c
-        self.biased, self.names, self.options = bias != 0, {"technique": "delta"}, "--technique delta"
-        self.precompute_seconds, self.session = 0.5, SimpleNamespace(kernel_seconds=3.0)
-        self.renders: list[tuple[int, int]] = []
-
-    def render(self, seed: int, spp: int) -> SimpleNamespace:
-        if len(self.renders) == self.ctrl_c:
-            raise KeyboardInterrupt
-        self.renders.append((seed, spp))
-        noise = np.random.default_rng(seed).standard_normal((SIZE, SIZE, 3)) * self.sigma / np.sqrt(spp)
-        seconds = {"render": spp / self.rate}
-        return SimpleNamespace(
-            image=(1 + self.bias + noise).astype(np.float32),
-            stats={"seconds": seconds, "lookups": spp * SIZE**2},
-            metadata={"seed": seed},
-        )
-
-
-def measured(trials: dict[str, MadeUp], effort: Effort) -> Comparison:
-    """A comparison of made-up trials."""
-    told: list[tuple[float, float, str]] = []
-    found, reference, interrupted = measure(
-        Lineup(trials), effort, None, MadeUp, lambda *record: told.append(record)
-    )
-    assert all(done <= total + 1e-6 for done, total, _ in told if total)
-    labels = list(trials)
-    figures = compute_figures(found, reference, labels[0])
-    about = {"scene": "<i>x</i>", "rounds": len(found[0].seconds), "odd": float("nan")}
-    return Comparison(figures, labels[0], reference, (), (), interrupted, about)
 
 
 # ---- what is compared
@@ -153,7 +119,9 @@ def test_rounds_take_equal_time_seeds_differ_and_the_reference_has_ten_times_the
     comparison = measured(trials, Effort(rounds=5, seconds=5.0, seed=7))
     fast, slow = (f.measured for f in comparison.figures)
     assert fast.spp == pytest.approx(4000, rel=0.01) and slow.spp == pytest.approx(1000, rel=0.01)
-    assert [*fast.shorter] == [fast.spp // 4, fast.spp // 16]
+    assert [*fast.shorter] == [fast.spp // 4**step for step in range(1, 6)]
+    assert fast.picture.spp == pytest.approx(4 * slow.picture.spp, rel=0.01)  # in the same time
+    assert fast.picture.seconds == pytest.approx(1.0, rel=0.01)
     assert all(f.render_slope.low < -1 < f.render_slope.high for f in comparison.figures)
     assert "compatible with the -1 of independent" in " ".join(comparison.words)
     seeds = [seed for trial in trials.values() for seed, _ in trial.renders]
@@ -171,15 +139,13 @@ def test_a_biased_combination_never_makes_the_reference() -> None:
 
 
 def test_ctrl_c_keeps_complete_rounds_but_not_too_few() -> None:
-    trials = {
-        "first": MadeUp(),
-        "second": MadeUp(sigma=9.0, ctrl_c=4 + 6),
-    }  # four to try it out, then six rounds
+    before, each = 4 + 1, 2  # trying it out and a picture; rounds of 4 samples and of 1
+    trials = {"first": MadeUp(), "second": MadeUp(sigma=9.0, ctrl_c=before + 6 * each)}
     comparison = measured(trials, Effort(rounds=10, spp=4))
     assert comparison.interrupted and len(comparison.figures[0].seconds) == 6
     assert any("Interrupted" in sentence for sentence in comparison.words)
     with pytest.raises(KeyboardInterrupt):
-        measured({"first": MadeUp(ctrl_c=5)}, Effort(rounds=10, spp=4))
+        measured({"first": MadeUp(ctrl_c=before + 1)}, Effort(rounds=10, spp=4))
 
 
 def test_seeds_leave_out_those_of_a_given_reference() -> None:
@@ -232,7 +198,8 @@ def test_the_slope_of_one_render_over_its_samples_and_its_interval() -> None:
         steeper += found.high < -1
     assert covered >= stats.binom.ppf(FALSE_ALARM, comparisons, 0.95) and covered < comparisons
     assert steeper > 0.9 * comparisons
-    assert shorter_spp(64) == (16, 4) and shorter_spp(15) == ()
+    assert shorter_spp(64) == (16, 4, 1) and shorter_spp(15) == (3,) and shorter_spp(1) == ()
+    assert slope_spp(1024) == (256, 64) and slope_spp(31) == (7,) and slope_spp(15) == ()
     assert np.isnan(render_slope({4: np.ones(10)}).value)
 
 
@@ -267,7 +234,8 @@ def test_rare_bright_samples_are_no_bias_against_a_given_reference(tmp_path: Pat
     for _ in range(20):
         images = np.stack([rare(random, 1) for _ in range(4)])
         trial, ones = MadeUp(), np.ones(4)
-        found = [Measured("delta", trial, 1, images, ones, ones, (1, 2, 3, 4))]
+        picture = Render(images[0], 1.0, 1.0, 1, 1)
+        found = [Measured("delta", trial, 1, images, ones, ones, (1, 2, 3, 4), picture)]
         for name, reference in (("as it is", given), ("samples unknown", replace(given, spp=None))):
             alarms[name] += not compute_figures(found, reference, "delta")[0].verdict.agrees
     assert alarms["as it is"] == 0 < 3 < alarms["samples unknown"]
@@ -325,6 +293,8 @@ def test_a_narrow_terminal_has_a_paragraph_a_combination_and_a_star_its_footnote
     wide, narrow = text_table(made, 1000), text_table(made, 80)
     assert max(map(len, narrow.splitlines())) <= 80 and {"a", "b"} < {*narrow.splitlines()}
     assert "no bias seen" in wide and "no bias seen" in narrow
+    for samples in ("at 8 × 8000 spp", "at 32000 against 8000 spp"):
+        assert samples in wide and samples in narrow.replace("\n  ", " ")
     assert wide.endswith("* significantly different from a") and narrow.endswith("different from a")
     assert "*" not in text_table(measured({"a": MadeUp(), "b": MadeUp()}, Effort(rounds=4, spp=4)))
 
@@ -389,7 +359,9 @@ def test_the_report_is_whole_escaped_and_without_nan(tmp_path: Path) -> None:
     page = (tmp_path / "report" / "report.html").read_text()
     assert "<b>" not in page and "<i>" not in page and "&lt;b&gt;" in page
     assert not re.search(r'(src|href)="(?!data:)', page) and "url(" not in page and "http" not in page
-    assert page.count("<img") == len([n for n in written["files"] if n.endswith(".png")]) + 1 + 3 * 2
+    rows = 3 if has_flip() else 2
+    plots = len([name for name in written["files"] if name.endswith(".png")])
+    assert page.count("<img") == plots + 1 + 2 * (rows + 2)
     assert read_reference(
         tmp_path / "report" / "reference.exr",
         film_only(),

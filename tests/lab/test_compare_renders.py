@@ -16,10 +16,11 @@ from scipy import stats
 from stat_tests import FALSE_ALARM, sidak
 
 import clvol
+from clvol.lab.comparison.entrants import Render
 from clvol.lab.comparison.figures import LEVEL, Figures, compute_figures
 from clvol.lab.comparison.measure import Measured
 from clvol.lab.comparison.reference import Reference
-from clvol.lab.comparison.shorter import render_slope
+from clvol.lab.comparison.shorter import render_slope, slope_spp
 from clvol.lab.efficiency import error_products, fitted_slope
 from clvol.lab.trials import Trial
 from clvol.planning.choices import Choices
@@ -61,7 +62,7 @@ def comparison(tmp_path_factory: pytest.TempPathFactory) -> Comparison:
     path, scene = tmp_path_factory.mktemp("reference") / "reference.exr", cube(24)
     clvol.render(scene, spp=2048, technique="regular", sampler="sobol", seed=10**9).save(path)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("clvol.lab.comparison.measure._TRIAL_SECONDS", 0.0)  # trials as short as can be
+        patch.setattr("clvol.lab.comparison.entrants._TRIAL_SECONDS", 0.0)  # trials as short as can be
         return clvol.compare(
             scene,
             techniques=list(TECHNIQUES),
@@ -77,7 +78,8 @@ def comparison(tmp_path_factory: pytest.TempPathFactory) -> Comparison:
 def slopes(figures: Figures, reference: Reference, level: float, bright: float = 1.0) -> list[Interval]:
     """Over renders and over samples; with `bright`, of pictures that are too bright by that factor."""
     measured = figures.measured
-    rounds = {measured.spp: measured.images, **measured.shorter}
+    rounds = {measured.spp: measured.images}
+    rounds |= {spp: measured.shorter[spp].images for spp in slope_spp(measured.spp)}
     products = {
         spp: error_products(bright * images, reference.image, reference.variance)
         for spp, images in rounds.items()
@@ -147,6 +149,7 @@ def with_itself(request: pytest.FixtureRequest, device, truth: Reference) -> Com
     results = [trial.render(10 + n, spp) for n in range(3 * REPEATS * ROUNDS)]
     images = np.stack([r.image for r in results]).reshape(REPEATS, 3, ROUNDS, *results[0].image.shape)
     lookups = np.array([float(r.stats["lookups"]) for r in results]).reshape(REPEATS, 3, ROUNDS)
+    picture = Render(images[0, 0, 0], 1.0, 1.0, 0, spp)
     random = np.random.default_rng(1)
     of_rounds = np.exp(0.3 * random.standard_normal((REPEATS, 1, ROUNDS)))
     seconds = of_rounds * np.exp(0.1 * random.standard_normal((REPEATS, 3, ROUNDS)))
@@ -156,7 +159,9 @@ def with_itself(request: pytest.FixtureRequest, device, truth: Reference) -> Com
         return [
             compute_figures(
                 [
-                    Measured(label, trial, spp, images[r, n], spent[r, n], lookups[r, n], (0,) * ROUNDS)
+                    Measured(
+                        label, trial, spp, images[r, n], spent[r, n], lookups[r, n], (0,) * ROUNDS, picture
+                    )
                     for n, label in enumerate("abc")
                 ],
                 truth,

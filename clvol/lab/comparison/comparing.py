@@ -15,7 +15,7 @@ from clvol.errors import OptionError
 from clvol.lab.comparison.bar import Bar
 from clvol.lab.comparison.combine import open_lineup
 from clvol.lab.comparison.figures import compute_figures
-from clvol.lab.comparison.measure import REFERENCE_SAMPLES, Effort, Measured, Told, measure
+from clvol.lab.comparison.measure import REFERENCE_SAMPLES, Effort, Measured, measure
 from clvol.lab.comparison.reference import Reference, read_reference
 from clvol.lab.comparison.result import Comparison
 from clvol.lab.efficiency import LEAST_ROUNDS
@@ -30,6 +30,8 @@ from clvol.version import __version__
 if TYPE_CHECKING:
     import os
     from collections.abc import Iterable
+
+    from clvol.lab.comparison.entrants import Told
 
 DEFAULT_SECONDS = 10.0
 MOST_ROUNDS = 10_000

@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.lab.agreement import Agreement, agreement
-from clvol.lab.comparison.shorter import render_slope
+from clvol.lab.comparison.equal_time import EqualTime, equal_time
+from clvol.lab.comparison.one_render import OneRender, one_render
+from clvol.lab.comparison.relative import relative_weight
+from clvol.lab.comparison.shorter import render_slope, slope_spp
 from clvol.lab.efficiency import (
     Work,
     compare_efficiency,
@@ -29,8 +32,6 @@ LEVEL = 0.05
 """Probability that any of the efficiencies of one kind is called significantly different though it is not."""
 ALPHA = 1e-4
 """Probability that an unbiased combination is called biased."""
-DARK = 0.1
-"""Relative errors are of F² + (DARK · mean of F)²: radiance far below the mean does not count for more."""
 COSTS = {"seconds": "time", "lookups": "look-ups"}
 
 
@@ -90,6 +91,10 @@ class Figures:
     ----------
     measured
         Its rounds, as they were rendered.
+    picture
+        Its picture at equal time, with what it differs by from the reference.
+    one_render
+        The relative error of one render over its samples.
     mse, relmse
         The absolute and the relative error over the rounds.
     seconds, lookups
@@ -112,6 +117,8 @@ class Figures:
     """
 
     measured: Measured
+    picture: EqualTime
+    one_render: OneRender
     mse: Curve
     relmse: Curve
     seconds: np.ndarray
@@ -154,6 +161,8 @@ def compute_figures(measured: list[Measured], reference: Reference, baseline: st
     return tuple(
         Figures(
             m,
+            equal_time(m.picture, reference, weight),
+            one_render(m, reference, weight),
             _curve(products[m.label]),
             _curve(relative := error_products(m.images, reference.image, reference.variance, weight)),
             m.trial.precompute_seconds + _running(m.seconds),
@@ -176,12 +185,6 @@ def compute_figures(measured: list[Measured], reference: Reference, baseline: st
     )
 
 
-def relative_weight(reference: np.ndarray) -> np.ndarray:
-    """1 / (F² + (DARK · mean F)²), what makes a squared error relative; 1 for a black picture."""
-    floor = (DARK * float(np.abs(reference).mean())) ** 2
-    return 1.0 / (reference**2 + floor) if floor > 0 else np.ones_like(reference)
-
-
 def _running(cost: np.ndarray) -> np.ndarray:
     return np.arange(1, len(cost) + 1) * float(cost.mean())
 
@@ -193,8 +196,10 @@ def _curve(products: np.ndarray) -> Curve:
 
 def _render_slope(measured: Measured, products: np.ndarray, reference: Reference) -> Interval:
     errors = {measured.spp: np.diag(products)}
-    for spp, images in measured.shorter.items():
-        errors[spp] = np.diag(error_products(images, reference.image, reference.variance))
+    for spp in slope_spp(measured.spp):
+        if spp in measured.shorter:
+            images = measured.shorter[spp].images
+            errors[spp] = np.diag(error_products(images, reference.image, reference.variance))
     return render_slope(errors)
 
 

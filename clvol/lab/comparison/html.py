@@ -3,59 +3,41 @@
 from __future__ import annotations
 
 import base64
+import math
 from html import escape
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
-from clvol.lab.comparison.figures import ALPHA, DARK
-from clvol.lab.comparison.plots import error_pictures, error_scales, picture
-from clvol.lab.comparison.table import table_rows
+from clvol.lab.comparison.figures import ALPHA
+from clvol.lab.comparison.flip import HINT
+from clvol.lab.comparison.pictures import error_picture, error_scale, picture, round_pictures, round_scales
+from clvol.lab.comparison.relative import DARK, relative_weight
+from clvol.lab.comparison.style import CSS, SCRIPT
+from clvol.lab.comparison.table import has_flip_errors, table_rows
 from clvol.lab.comparison.words import sentences
+from clvol.lab.digits import two_digits
 
 if TYPE_CHECKING:
     from clvol.lab.comparison.findings import Findings
 
-CSS = """
-:root { --ink: #22272e; --soft: #68707c; --line: #e3e6ea; --wash: #f7f8fa; --accent: #0072b2; }
-* { box-sizing: border-box; }
-body { margin: 0; color: var(--ink); background: white;
-  font: 15px/1.55 system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; }
-main { max-width: 1120px; margin: 0 auto; padding: 32px 24px 64px; }
-h1 { font-size: 26px; margin: 0 0 4px; } h2 { font-size: 18px; margin: 40px 0 12px; }
-.lead, figcaption, .note { color: var(--soft); } .note { font-size: 13px; }
-code { font: 13px ui-monospace, "DejaVu Sans Mono", monospace; background: var(--wash); padding: 1px 5px;
-  border-radius: 4px; overflow-wrap: anywhere; }
-ul.words { list-style: none; padding: 0; margin: 12px 0; }
-ul.words li { margin: 6px 0; padding: 7px 14px; border-left: 4px solid var(--line); background: var(--wash);
-  border-radius: 0 6px 6px 0; overflow-wrap: anywhere; }
-ul.words li.finding { border-color: var(--accent); } ul.words li.verdict { border-color: #009e73; }
-ul.words li.alarm { border-color: #c62828; background: #fdf1f0; }
-ul.words li.warning { border-color: #e69f00; background: #fff9ec; }
-.scroll { overflow-x: auto; } table { border-collapse: collapse; width: 100%; font-size: 14px; }
-th, td { padding: 6px 10px; border-bottom: 1px solid var(--line); text-align: right; vertical-align: top;
-  font-variant-numeric: tabular-nums; }
-th { color: var(--soft); font-weight: 600; } th:first-child, td:first-child { text-align: left; }
-table.left th, table.left td { text-align: left; }
-.plots { display: flex; flex-wrap: wrap; gap: 16px; } .plots img { width: 100%; }
-.plots figure { flex: 1 1 440px; max-width: 540px; }
-.plots figure.wide { flex-basis: 100%; max-width: 900px; }
-figure { margin: 0; } figcaption { font-size: 13px; margin-top: 2px; }
-.pictures { display: flex; flex-wrap: wrap; gap: 14px; } .pictures figure { flex: 0 1 246px; }
-.pictures img { width: 100%; min-width: 160px; image-rendering: pixelated; border-radius: 4px;
-  display: block; }
-.bar { height: 10px; width: 246px; border-radius: 5px; margin: 4px 0; }
-.magma { background: linear-gradient(90deg, #000004, #51127c, #b73779, #fc8961, #fcfdbf); }
-.signed { background: linear-gradient(90deg, #053061, #4393c3, #f7f7f7, #d6604d, #67001f); }
-.ends { display: flex; justify-content: space-between; width: 246px; font-size: 12px; color: var(--soft); }
-"""
-
 CAPTIONS = {
-    "relmse_over_seconds": "Relative MSE over time, precomputation counted, kernel builds apart.",
-    "rmse_over_seconds": "RMSE over time.",
-    "relmse_over_lookups": "Relative MSE over look-ups of the density, which no machine changes.",
-    "rmse_over_lookups": "RMSE over look-ups.",
+    "one_render_over_spp": "Relative MSE of one render over its samples.",
+    "one_render_over_seconds": "Over its seconds, precomputation and kernel builds apart.",
+    "one_render_over_lookups": "Over its look-ups of the density, which no machine changes.",
     "efficiency": "1 / (MSE × cost) over the baseline's, 95 % intervals; hollow: no significant difference.",
+    "means_over_seconds": "Relative MSE of means of 1, 2, … renders over their time, precomputation counted.",
 }
+
+
+ONE_RENDER = (
+    "Means over independent renders of each length, with 95 % intervals. The error of independent samples "
+    "falls along the dashed line; that of samplers sobol and joint may fall faster; bias flattens."
+)
+MEANS = (
+    "Errors of means of k = 1, 2, … separate renders, averaged over every order of them; bands are 95 % "
+    "bootstraps over renders, on the wide side. Without bias they follow the dashed line, whatever the "
+    "sampler, but for precomputation, which moves curves to the right; bias flattens them."
+)
 
 
 def html_report(findings: Findings, drawn: dict[str, bytes]) -> str:
@@ -64,13 +46,19 @@ def html_report(findings: Findings, drawn: dict[str, bytes]) -> str:
     parts = [
         f"<h1>{escape(name)}: speed against error</h1>",
         f'<p class="lead">{_lead(findings)}</p>',
+        "<h2>Pictures at equal time</h2>",
+        _pictures(findings),
+        "<h2>Error of one render</h2>",
+        _plots(drawn, [name for name in drawn if name.startswith("one_render")]),
+        f'<p class="note">{escape(ONE_RENDER)}</p>',
         "<h2>What was found</h2>",
         _words(findings),
         _summary(findings),
-        "<h2>Error over cost</h2>",
-        _plots(drawn),
-        "<h2>Pictures</h2>",
-        _pictures(findings),
+        _plots(drawn, ["efficiency"]),
+        "<h2>All renders together</h2>",
+        _rounds(findings),
+        _plots(drawn, ["means_over_seconds"]),
+        f'<p class="note">{escape(MEANS)}</p>',
         "<h2>How it was made</h2>",
         _made(findings),
     ]
@@ -79,7 +67,7 @@ def html_report(findings: Findings, drawn: dict[str, bytes]) -> str:
     body = "\n".join(parts)
     return (
         f'<!doctype html>\n<html lang="en"><head>{head}{view}<style>{CSS}</style></head>\n'
-        f"<body><main>\n{body}\n</main></body></html>\n"
+        f"<body><main>\n{body}\n</main><script>{SCRIPT}</script></body></html>\n"
     )
 
 
@@ -107,61 +95,96 @@ def _words(findings: Findings) -> str:
 
 
 def _table(heads: list[str], rows: list[list[str]], kind: str = "") -> str:
+    """Cells are HTML."""
     head = "".join(f"<th>{escape(text)}</th>" for text in heads)
-    body = "".join("<tr>" + "".join(f"<td>{escape(c)}</td>" for c in row) + "</tr>" for row in rows)
+    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
     return f'<div class="scroll"><table class="{kind}"><tr>{head}</tr>{body}</table></div>'
 
 
 def _summary(findings: Findings) -> str:
+    heads, rows = table_rows(findings)
     note = (
-        f"Relative RMSE and largest error: of the mean of all rounds; relative to F² + ({DARK:g} · mean F)², "
-        "F being the reference, whose own variance is subtracted. Efficiency: times the baseline's, with its "
-        "95 % interval, for renders of as many samples as the table says (samplers sobol and joint gain with "
-        f"their number); * significantly different. Verdicts raise a false alarm with probability {ALPHA:g}."
+        f"Errors are relative to F² + ({DARK:g} · mean F)², F being the reference, whose own variance is "
+        "subtracted; spp are samples a pixel. Efficiency: times the baseline's, with its 95 % interval; it "
+        "holds for renders of as many samples as stand beside it (samplers sobol and joint gain with their "
+        f"number); * significantly different. Verdicts raise a false alarm with probability {ALPHA:g}."
     )
-    return _table(*table_rows(findings)) + f'<p class="note">{escape(note)}</p>'
+    cells = [
+        [escape(c.figure) + (f"<small>{escape(c.samples)}</small>" if c.samples else "") for c in row]
+        for row in rows
+    ]
+    return _table(heads, cells) + f'<p class="note">{escape(note)}</p>'
 
 
-def _plots(drawn: dict[str, bytes]) -> str:
+def _plots(drawn: dict[str, bytes], names: list[str]) -> str:
     figures = []
-    for name, png in drawn.items():
-        caption = escape(CAPTIONS[name])
-        wide = ' class="wide"' if name == "efficiency" else ""
-        figures.append(f"<figure{wide}>{_img(png, caption)}<figcaption>{caption}</figcaption></figure>")
-    note = (
-        "Errors of means of k = 1, 2, … separate renders, averaged over every order of them; bands are 95 % "
-        "bootstraps over renders, on the wide side. Means of separate renders without bias follow the dashed "
-        "line, whatever the sampler, but for precomputation, which moves curves over time to the right; bias "
-        "flattens. Fitted slopes are over k."
-    )
-    return f'<div class="plots">{"".join(figures)}</div><p class="note">{escape(note)}</p>'
+    for name in names:
+        if name in drawn:
+            caption = escape(CAPTIONS[name])
+            wide = ' class="wide"' if name == "efficiency" else ""
+            figures.append(
+                f"<figure{wide}>{_img(drawn[name], caption)}<figcaption>{caption}</figcaption></figure>"
+            )
+    return f'<div class="plots">{"".join(figures)}</div>'
 
 
-def _img(png: bytes, alt: str) -> str:
+def _img(png: bytes, alt: str, attributes: str = "") -> str:
     data = base64.b64encode(png).decode("ascii")
-    return f'<img alt="{alt}" src="data:image/png;base64,{data}">'
+    return f'<img alt="{alt}"{attributes} src="data:image/png;base64,{data}">'
 
 
 def _pictures(findings: Findings) -> str:
-    scales = error_scales(findings)
-    rows: list[list[tuple[str, bytes]]] = [[("reference", picture(findings.reference.image))], [], []]
+    """A column for each combination: its picture, its error, its FLIP error."""
+    scale, flips = error_scale(findings), has_flip_errors(findings)
+    keys = [f"Below: error of each pixel, relative{_scale('magma', '0', f'{scale:.2g}')}"]
+    keys += [f"At the bottom: FLIP error{_scale('magma', '0', '1')}"] if flips else [escape(HINT)]
+    key = f'<div class="key">{"".join(f"<div>{text}</div>" for text in keys)}</div>'
+    truth = _img(picture(findings.reference.image), "reference", ' id="reference"')
+    said = f"{findings.reference.spp} spp" if findings.reference.spp else "as given"
+    own = math.sqrt(float((findings.reference.variance * relative_weight(findings.reference.image)).mean()))
+    said += (
+        f"<br>its own rel. RMSE {two_digits(own)}"
+        if findings.reference.variance_known
+        else "<br>its error unknown"
+    )
+    cards = [f"<figure><figcaption><strong>reference</strong>{said}</figcaption>{truth}{key}</figure>"]
     for f in findings.figures:
-        shown = [picture(f.image), *error_pictures(f, findings, scales)]
-        for row, png in zip(rows, shown, strict=True):
-            row.append((f.label + (" (biased)" if f.biased else ""), png))
+        shown, label = f.picture, escape(f.label + (" (biased)" if f.biased else ""))
+        words = f"{shown.render.spp} spp in {two_digits(shown.render.seconds)} s"
+        words += f"<br>rel. RMSE {two_digits(shown.relrmse)}"
+        words += "" if shown.flip is None else f", FLIP {two_digits(shown.mean_flip)}"
+        images = [_img(picture(shown.render.image), label, ' class="shown"')]
+        images.append(_img(error_picture(shown.error, scale), f"error of {label}"))
+        if shown.flip is not None:
+            images.append(_img(error_picture(shown.flip, 1.0), f"FLIP error of {label}"))
+        cards.append(
+            f"<figure><figcaption><strong>{label}</strong>{words}</figcaption>{''.join(images)}</figure>"
+        )
+    note = (
+        "One render of each, of as many samples as the same time allowed; precomputation and kernel builds "
+        "are apart. Press a picture to see the reference in its place."
+    )
+    return f'<div class="pictures cards">{"".join(cards)}</div><p class="note">{escape(note)}</p>'
+
+
+def _rounds(findings: Findings) -> str:
+    """What shows only in many renders: where they are noisy, and where their mean is wrong."""
+    scales = round_scales(findings)
+    rows: list[list[tuple[str, bytes]]] = [[], []]
+    for f in findings.figures:
+        for row, png in zip(rows, round_pictures(f, findings, scales), strict=True):
+            row.append((escape(f.label + (" (biased)" if f.biased else "")), png))
     titles = (
-        ("Means of all rounds", ""),
-        ("Relative RMS error of one round", _scale("magma", "0", f"{scales[0]:.2g}")),
+        ("Relative RMS error of one render", _scale("magma", "0", f"{scales[0]:.2g}")),
         (
-            "Relative difference of the mean of all rounds: structure is bias, speckle is noise",
+            "Relative difference of the mean of all renders: structure is bias, speckle is noise",
             _scale("signed", f"-{scales[1]:.2g}", f"+{scales[1]:.2g}"),
         ),
     )
     parts = []
     for (title, scale), row in zip(titles, rows, strict=True):
         figures = "".join(
-            f"<figure>{_img(png, escape(label))}<figcaption>{escape(label)}</figcaption></figure>"
-            for label, png in row
+            f"<figure>{_img(png, label)}<figcaption>{label}</figcaption></figure>" for label, png in row
         )
         parts.append(f'<p class="lead">{escape(title)}</p>{scale}<div class="pictures">{figures}</div>')
     return "\n".join(parts)
@@ -184,4 +207,5 @@ def _made(findings: Findings) -> str:
             [f.label, spp, seconds, kernels, f"{len(m.seeds)} of {min(m.seeds)} to {max(m.seeds)}", options]
         )
     heads = ["combination", "samples", "precomputation + render, s", "kernel builds, s", "seeds", "options"]
-    return _table(["", ""], facts, "left") + _table(heads, rows, "left")
+    tables = (["", ""], facts), (heads, rows)
+    return "".join(_table(head, [[*map(escape, row)] for row in body], "left") for head, body in tables)

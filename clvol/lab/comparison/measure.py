@@ -5,34 +5,28 @@ A short trial sets the samples of a round; each render has a seed of its own.
 
 from __future__ import annotations
 
-import logging
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from clvol.base.interrupts import interruptible
+from clvol.lab.comparison.entrants import Clock, Entrant, Render, Told
 from clvol.lab.comparison.reference import Reference
 from clvol.lab.comparison.shorter import shorter_spp
 from clvol.lab.efficiency import LEAST_ROUNDS
-from clvol.lab.quiet import log_filter
 from clvol.lab.seeds import seeds_from
 from clvol.lab.trials import Trial, rounds
 from clvol.planning.registry import SAMPLERS
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
     from clvol.lab.comparison.combine import Lineup
-    from clvol.picture.result import Result
 
 REFERENCE_SAMPLES = 10
 """The reference has about so many times the samples that its combination has in all rounds together."""
-_TRIAL_SECONDS = 0.3
-
-Told = Callable[[float, float, str], None]
-"""Receives seconds of work done, seconds expected in all (0 while unknown), and what is being done."""
 
 
 @dataclass(frozen=True)
@@ -57,17 +51,35 @@ class Effort:
     seed: int = 0
 
 
+class Rounds(NamedTuple):
+    """Independent renders of equal length.
+
+    images : float32 (rounds, height, width, 3).
+    seconds, lookups : float64 (rounds,): of each render.
+    """
+
+    images: np.ndarray
+    seconds: np.ndarray
+    lookups: np.ndarray
+
+    @classmethod
+    def of(cls, renders: Sequence[Render]) -> Rounds:
+        """What was kept of each, in arrays."""
+        numbers = np.array([(r.seconds, r.lookups) for r in renders])
+        return cls(np.stack([r.image for r in renders]), *numbers.T)
+
+
 @dataclass(frozen=True, eq=False)
 class Measured:
     """One combination's rounds.
 
     Parameters
     ----------
-    images : float32 (rounds, height, width, 3)
-    seconds, lookups : float64 (rounds,): of each render.
+    spp, images, seconds, lookups : samples per pixel of each render, and `Rounds` of them.
     seeds : of each render.
+    picture : one render that took about the same seconds as those of the other combinations.
     notes : warnings it gave, each once.
-    shorter : images of as many renders with fewer samples, by samples of a render.
+    shorter : as many renders with fewer samples, by samples of a render.
     """
 
     label: str
@@ -77,75 +89,9 @@ class Measured:
     seconds: np.ndarray
     lookups: np.ndarray
     seeds: tuple[int, ...]
+    picture: Render
     notes: tuple[str, ...] = ()
-    shorter: dict[int, np.ndarray] = field(default_factory=dict)
-
-
-class _Render(NamedTuple):
-    """What is kept of a Result."""
-
-    image: np.ndarray
-    seconds: float
-    lookups: float
-    seed: int
-
-    @classmethod
-    def of(cls, result: Result) -> _Render:
-        stats = result.stats
-        return cls(result.image, stats["seconds"]["render"], float(stats["lookups"]), result.metadata["seed"])
-
-
-@dataclass(eq=False)
-class _Entrant:
-    """A trial in the rounds: what it will render, and what the progress is told."""
-
-    label: str
-    trial: Trial
-    told: Callable[[str], None]
-    notes: dict[str, str] = field(default_factory=dict)
-    spp: int = 1
-    pace: float = 0.0
-    """Seconds per sample of every pixel."""
-    variance: float = math.inf
-    """Of one such sample, mean over the picture."""
-
-    def render(self, seed: int, spp: int) -> Result:
-        """As `Trial.render`; warnings are kept, and shown once."""
-        with _noted(self.notes):
-            result = self.trial.render(seed, spp)
-        self.told(self.label)
-        return result
-
-    def try_out(self, seeds: Iterator[int], most: int | None) -> None:
-        """Find pace and variance from renders that are not used otherwise."""
-        spp = 1
-        while True:
-            first = self.render(next(seeds), spp)
-            taken = first.stats["seconds"]["render"]
-            if taken >= _TRIAL_SECONDS or (most is not None and spp >= most) or spp >= 2**20:
-                break
-            spp *= 2 if taken > _TRIAL_SECONDS / 4 else 4
-            spp = spp if most is None else min(spp, most)
-        second, third = (self.render(next(seeds), spp) for _ in range(2))
-        self.pace = float(np.median([r.stats["seconds"]["render"] for r in (first, second, third)])) / spp
-        difference = first.image.astype(np.float64) - second.image
-        self.variance = float((difference**2).mean()) / 2 * spp
-
-
-@contextmanager
-def _noted(notes: dict[str, str]) -> Iterator[None]:
-    """Let each warning of clvol's log through once; collect it under its wording without numbers."""
-
-    def first_time(record: logging.LogRecord) -> bool:
-        if record.levelno < logging.WARNING:
-            return False
-        wording = str(record.msg) + str([a for a in record.args or () if isinstance(a, str)])
-        known = wording in notes
-        notes.setdefault(wording, record.getMessage())
-        return not known
-
-    with log_filter(first_time):
-        yield
+    shorter: dict[int, Rounds] = field(default_factory=dict)
 
 
 def measure(
@@ -156,11 +102,11 @@ def measure(
     `spare` opens an unbiased trial, for the case that none of the line-up's is.  Ctrl-C keeps the rounds that
     are complete; KeyboardInterrupt where they are fewer than `efficiency.LEAST_ROUNDS`.
     """
-    clock = _Clock(told)
+    clock = Clock(told)
     taken = given.seeds if given else None
     # How many trials there are depends on the machine's pace; the rounds' seeds do not.
     seeds, trial_seeds = seeds_from(effort.seed, taken), seeds_from((effort.seed + 2**63) % 2**64, taken)
-    entrants = [_Entrant(label, trial, clock.tick) for label, trial in lineup.trials.items()]
+    entrants = [Entrant(label, trial, clock.tick) for label, trial in lineup.trials.items()]
     for entrant in entrants:
         entrant.try_out(trial_seeds, effort.spp)
         entrant.spp = effort.spp or _samples(effort.seconds / effort.rounds / max(entrant.pace, 1e-9), lineup)
@@ -172,12 +118,14 @@ def measure(
     running = [*entrants, *(short for *_, short in shorter)]
     if given is None:
         running.append(_reference_entrant(entrants, lineup, effort, spare, trial_seeds, clock))
-    clock.expect({e.label: e.pace * e.spp for e in running}, effort.rounds)
+    pictured = equal_seconds(entrants)
+    clock.expect({e.label: e.pace * e.spp for e in running}, effort.rounds, pictured * len(entrants))
+    pictures = [entrant.render_for(pictured, trial_seeds) for entrant in entrants]
     done, interrupted = _rounds(running, effort.rounds, seeds)
     columns = list(zip(*done, strict=True))
-    measured = [_measured(e, column) for e, column in zip(entrants, columns, strict=False)]
+    measured = [_measured(*parts) for parts in zip(entrants, pictures, columns, strict=False)]
     for (entrant, spp, _), column in zip(shorter, columns[len(entrants) :], strict=False):
-        measured[entrants.index(entrant)].shorter[spp] = np.stack([r.image for r in column])
+        measured[entrants.index(entrant)].shorter[spp] = Rounds.of(column)
     if given is None:
         made = running[-1]
         images = np.stack([r.image for r in columns[-1]])
@@ -188,14 +136,19 @@ def measure(
     return measured, given, interrupted
 
 
-def _rounds(running: list[_Entrant], count: int, seeds: Iterator[int]) -> tuple[list[list[_Render]], bool]:
+def equal_seconds(entrants: Sequence[Entrant]) -> float:
+    """Seconds for a picture of each: as many as a round's in the middle, and a sample of the slowest's."""
+    return max(float(np.median([e.pace * e.spp for e in entrants])), max(e.pace for e in entrants))
+
+
+def _rounds(running: list[Entrant], count: int, seeds: Iterator[int]) -> tuple[list[list[Render]], bool]:
     """`count` rounds, or those that were complete at a Ctrl-C, and whether there was one."""
-    done: list[list[_Render]] = []
+    done: list[list[Render]] = []
     with interruptible() as interrupt:
         try:
             interrupt.heed(patience=0)
             for results in rounds(running, [e.spp for e in running], seeds):
-                done.append([_Render.of(result) for result in results])
+                done.append([Render.of(r, e.spp) for r, e in zip(results, running, strict=True)])
                 if len(done) == count:
                     interrupt.keep()
                     break
@@ -225,55 +178,31 @@ def is_low_discrepancy(trial: Trial) -> bool:
 
 
 def _reference_entrant(
-    entrants: list[_Entrant],
+    entrants: list[Entrant],
     lineup: Lineup,
     effort: Effort,
     spare: Callable[[], Trial],
     trial_seeds: Iterator[int],
-    clock: _Clock,
-) -> _Entrant:
+    clock: Clock,
+) -> Entrant:
     """The most efficient unbiased combination of the trial, again, with many more samples."""
     unbiased = [e for e in entrants if not e.trial.biased]
     if not unbiased:
-        unbiased = [_Entrant("auto", spare(), clock.tick)]
+        unbiased = [Entrant("auto", spare(), clock.tick)]
         unbiased[0].try_out(trial_seeds, effort.spp)
         unbiased[0].spp = effort.spp or _samples(effort.seconds / effort.rounds / unbiased[0].pace, lineup)
     best = min(unbiased, key=lambda e: e.variance * e.pace)
     spp = _samples(REFERENCE_SAMPLES * best.spp, lineup)
     if effort.reference_spp is not None:
         spp = math.ceil(effort.reference_spp / effort.rounds)
-    return _Entrant("reference", best.trial, clock.tick, best.notes, spp, best.pace, best.variance)
+    return Entrant("reference", best.trial, clock.tick, best.notes, spp, best.pace, best.variance)
 
 
-def _measured(entrant: _Entrant, results: tuple[_Render, ...]) -> Measured:
+def _measured(entrant: Entrant, picture: Render, results: tuple[Render, ...]) -> Measured:
     return Measured(
-        entrant.label,
-        entrant.trial,
-        entrant.spp,
-        np.stack([r.image for r in results]),
-        np.array([r.seconds for r in results]),
-        np.array([r.lookups for r in results]),
+        *(entrant.label, entrant.trial, entrant.spp),
+        *Rounds.of(results),
         tuple(r.seed for r in results),
+        picture,
         tuple(entrant.notes.values()),
     )
-
-
-class _Clock:
-    """Counts expected seconds of work, render by render."""
-
-    def __init__(self, told: Told) -> None:
-        self.told = told
-        self.expected: dict[str, float] = {}
-        self.total = self.done = 0.0
-
-    def expect(self, seconds: dict[str, float], turns: int) -> None:
-        """From now on, so many seconds for each render of a label."""
-        self.expected, self.total = seconds, turns * sum(seconds.values())
-        self.told(0.0, self.total, "rendering by turns")
-
-    def tick(self, label: str) -> None:
-        """A render is done."""
-        self.done += self.expected.get(label, 0.0)
-        self.told(
-            self.done, self.total, "rendering by turns" if self.total else f"finding the pace of {label}"
-        )

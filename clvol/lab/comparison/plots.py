@@ -1,17 +1,15 @@
-"""Plots and pictures of a comparison, as PNG bytes."""
+"""Plots of a comparison, as PNG bytes."""
 
 from __future__ import annotations
 
 import io
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from clvol.lab.colours import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
-from clvol.lab.comparison.figures import COSTS, Figures, relative_weight
-from clvol.picture.image_io import shown_pixels
-from clvol.picture.view_transform import View
+from clvol.lab.comparison.figures import COSTS, Figures
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,28 +32,46 @@ STYLE: dict[Any, Any] = {
     "grid.linewidth": 0.7,
     "legend.frameon": False,
 }
-UNITS = {"seconds": "seconds", "lookups": "density look-ups"}
+UNITS = {"spp": "samples a pixel", "seconds": "seconds", "lookups": "density look-ups"}
 
 
 def plots(findings: Findings) -> dict[str, bytes]:
-    """PNG by name: error over each kind of cost, efficiency; those that can be drawn."""
+    """PNG by name: error of one render over samples and costs, efficiency, error of means of renders."""
     import matplotlib
     from matplotlib.figure import Figure
 
     drawn = {}
     with matplotlib.rc_context(STYLE):
-        costs = [cost for cost in COSTS if any(getattr(f, cost)[-1] > 0 for f in findings.figures)]
-        for cost in costs:
-            for name, label in (("relmse", "relative MSE"), ("rmse", "RMSE")):
-                figure = Figure(figsize=(5.6, 4.4), layout="constrained")
-                _errors(figure.add_subplot(), findings, name, cost)
-                figure.axes[0].set(xlabel=UNITS[cost], ylabel=label)
-                drawn[f"{name}_over_{cost}"] = _png(figure)
+        for cost in UNITS:
+            if any(getattr(f.one_render, cost)[-1] > 0 for f in findings.figures):
+                curves = [_of_one_render(f, cost) for f in findings.figures]
+                drawn[f"one_render_over_{cost}"] = _errors(findings, curves, UNITS[cost])
         if len(findings.figures) > 1:
             figure = Figure(figsize=(9.2, 1.3 + 0.34 * len(findings.figures)), layout="constrained")
             _efficiencies(figure, findings)
             drawn["efficiency"] = _png(figure)
+        curves = [_of_means(f) for f in findings.figures]
+        drawn["means_over_seconds"] = _errors(findings, curves, UNITS["seconds"])
     return drawn
+
+
+class _Drawn(NamedTuple):
+    """An error over what was spent for it, with the ends of its 95 % interval: float64 (n,) each."""
+
+    spent: np.ndarray
+    value: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+def _of_one_render(figures: Figures, cost: str) -> _Drawn:
+    one = figures.one_render
+    return _Drawn(getattr(one, cost), one.relmse, one.low, one.high)
+
+
+def _of_means(figures: Figures) -> _Drawn:
+    curve = figures.relmse
+    return _Drawn(figures.seconds, curve.value, curve.low, curve.high)
 
 
 def _look(number: int) -> dict[str, Any]:
@@ -65,38 +81,42 @@ def _look(number: int) -> dict[str, Any]:
     }
 
 
-def _errors(axes: Axes, findings: Findings, name: str, cost: str) -> None:
-    """One error over one cost, log-log, with bands and a guide of the slope that noise has."""
-    power = 0.5 if name == "rmse" else 1.0
+def _errors(findings: Findings, curves: list[_Drawn], unit: str) -> bytes:
+    """Relative MSE over one cost, log-log, with bands and a guide of the slope that noise has."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(4.4, 3.7), layout="constrained")
+    axes = figure.add_subplot()
     starts = []
-    for number, figures in enumerate(findings.figures):
-        curve = figures.mse if name == "rmse" else figures.relmse
-        spent, value = getattr(figures, cost), np.maximum(curve.value, 0.0) ** power
-        shown = (value > 0) & (spent > 0)
+    for number, (figures, curve) in enumerate(zip(findings.figures, curves, strict=True)):
+        shown = (curve.value > 0) & (curve.spent > 0)
         if not shown.any():
             continue
-        starts.append((float(spent[shown][0]), float(value[shown][0]), float(spent[shown][-1])))
+        spent, value, low, high = (ends[shown] for ends in curve)
+        starts.append((float(spent[0]), float(value[0]), float(spent[-1])))
         look = _look(number)
-        low, high = (np.maximum(end, curve.value.min() * 1e-3) ** power for end in (curve.low, curve.high))
-        axes.fill_between(spent[shown], low[shown], high[shown], color=look["color"], alpha=0.15, lw=0)
+        low, high = (np.maximum(end, value.min() * 1e-3) for end in (low, high))
+        axes.fill_between(spent, low, high, color=look["color"], alpha=0.15, lw=0)
         label = figures.label + (" (biased)" if figures.biased else "")
-        axes.plot(spent[shown], value[shown], marker="o", ms=3, lw=1.6, label=label, **look)
-    axes.set(xscale="log", yscale="log")
+        axes.plot(spent, value, marker="o", ms=4, lw=1.6, label=label, **look)
+    axes.set(xscale="log", yscale="log", xlabel=unit, ylabel="relative MSE")
     if starts:
-        _guide(axes, starts, power)
+        _guide(axes, starts)
     _plain_ticks(axes.xaxis)
     _plain_ticks(axes.yaxis)
     axes.grid(True, which="minor", color="#f2f2f2", linewidth=0.5)
-    axes.figure.legend(fontsize=8, loc="outside lower center", ncols=3)
+    figure.legend(fontsize=8, loc="outside lower center", ncols=3)
+    return _png(figure)
 
 
-def _guide(axes: Axes, starts: list[tuple[float, float, float]], power: float) -> None:
-    """A line of the slope that unbiased noise has, below the curves."""
-    begin, _, end = min(starts)
-    level = min(value * (start / begin) ** power for start, value, _ in starts) * 0.6
-    values = [level, level * (end / begin) ** -power]
-    slope = "-1/2" if power < 1 else "-1"
-    axes.plot([begin, end], values, color="#999999", lw=1, ls=(0, (4, 3)), label=f"slope {slope}", zorder=1)
+def _guide(axes: Axes, starts: list[tuple[float, float, float]]) -> None:
+    """A line of the slope that unbiased independent noise has, below the curves."""
+    begin = min(starts)[0]
+    end = max(last for *_, last in starts)
+    level = min(value * start / begin for start, value, _ in starts) * 0.6
+    if end > begin:
+        values = [level, level * begin / end]
+        axes.plot([begin, end], values, color="#999999", lw=1, ls=(0, (4, 3)), label="slope -1", zorder=1)
 
 
 def _efficiencies(figure: Figure, findings: Findings) -> None:
@@ -150,58 +170,6 @@ def plain_number(value: float) -> str:
     digits, power = f"{value:.3e}".split("e")
     digits = digits.rstrip("0").rstrip(".")
     return f"$10^{{{int(power)}}}$" if digits == "1" else f"{digits}·$10^{{{int(power)}}}$"
-
-
-def picture(image: np.ndarray) -> bytes:
-    """Linear radiance as a PNG as results are shown, pixel for pixel; what is not finite in magenta."""
-    return _pixels(np.rint(255 * shown_pixels(image, None, View().resolved())).astype(np.uint8))
-
-
-def error_scales(findings: Findings) -> tuple[float, float]:
-    """What the error images of all combinations end at.
-
-    The first is of a round's relative RMS error, the second of the relative difference of the mean.
-    """
-    spreads = [np.quantile(_spread(f, findings), 0.99) for f in findings.figures]
-    differences = [np.quantile(np.abs(_difference(f, findings)), 0.99) for f in findings.figures]
-    return max(float(max(spreads)), 1e-12), max(float(max(differences)), 1e-12)
-
-
-def error_pictures(figures: Figures, findings: Findings, scales: tuple[float, float]) -> list[bytes]:
-    """Where a round is noisy, and where the mean of all rounds is too bright (red) or too dark (blue)."""
-    import matplotlib
-
-    spread = np.clip(_spread(figures, findings) / scales[0], 0, 1)
-    difference = np.clip(_difference(figures, findings) / scales[1], -1, 1)
-    noisy = matplotlib.colormaps["magma"](spread)
-    signed = matplotlib.colormaps["RdBu_r"](difference / 2 + 0.5)
-    return [_pixels(np.rint(255 * colours[..., :3]).astype(np.uint8)) for colours in (noisy, signed)]
-
-
-def _level(findings: Findings) -> np.ndarray:
-    """What errors are relative to, (height, width): sqrt(F² + (DARK · mean F)²)."""
-    level: np.ndarray = 1.0 / np.sqrt(relative_weight(findings.reference.image.mean(axis=-1)))
-    return level
-
-
-def _spread(figures: Figures, findings: Findings) -> np.ndarray:
-    images, truth = figures.measured.images, findings.reference
-    squares = sum((image - truth.image) ** 2 for image in images) / len(images) - truth.variance
-    error: np.ndarray = np.sqrt(np.maximum(squares, 0.0).mean(axis=-1)) / _level(findings)
-    return error
-
-
-def _difference(figures: Figures, findings: Findings) -> np.ndarray:
-    error: np.ndarray = (figures.image - findings.reference.image).mean(axis=-1) / _level(findings)
-    return error
-
-
-def _pixels(pixels: np.ndarray) -> bytes:
-    from matplotlib.image import imsave
-
-    stream = io.BytesIO()
-    imsave(stream, pixels, format="png")
-    return stream.getvalue()
 
 
 def _png(figure: Figure) -> bytes:

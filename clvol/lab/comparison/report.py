@@ -8,6 +8,8 @@ report.json holds, numbers as numbers and unknown ones as null:
 - "combinations": a list of
   - label, options, names (by family), biased, notes, spp, seeds, precompute_seconds, kernel_seconds
   - round_seconds, round_lookups: of each round
+  - equal_time: spp, seconds, seed, relrmse and flip (null where it is not installed) of the picture
+  - one_render, lists over lengths: spp; seconds, lookups of one render; relmse, low, high: its relative MSE
   - curve: seconds, lookups (spent for the mean of 1, 2, … rounds); mse, relmse, rmse, relrmse, each value,
     low, high: of means of separate renders
   - slope (over the number of renders), render_slope (of one render, over its samples): value, low, high
@@ -201,6 +203,14 @@ def _combination(f: Figures) -> dict[str, Any]:
             "rmse": _ends(f.mse, 0.5),
             "relrmse": _ends(f.relmse, 0.5),
         },
+        "equal_time": {
+            "spp": f.picture.render.spp,
+            "seconds": f.picture.render.seconds,
+            "seed": f.picture.render.seed,
+            "relrmse": f.picture.relrmse,
+            "flip": f.picture.mean_flip,
+        },
+        "one_render": f.one_render._asdict(),
         "slope": f.slope,
         "render_slope": f.render_slope,
         "squared_bias": f.squared_bias,

@@ -17,9 +17,16 @@ _FACTOR, _STEPS, _LEAST = 4, 2, 4
 
 
 def shorter_spp(spp: int) -> tuple[int, ...]:
-    """Samples of the shorter renders: a quarter and a sixteenth of `spp`, those that are 4 or more."""
-    steps = (spp // _FACTOR**step for step in range(1, _STEPS + 1))
-    return tuple(count for count in steps if count >= _LEAST)
+    """Samples of the shorter renders: a quarter of `spp`, a sixteenth and so on, down to one."""
+    counts = []
+    while (spp := spp // _FACTOR) >= 1:
+        counts.append(spp)
+    return tuple(counts)
+
+
+def slope_spp(spp: int) -> tuple[int, ...]:
+    """Those that the slope at `spp` is told from: a quarter and a sixteenth, if they are 4 or more."""
+    return tuple(count for count in shorter_spp(spp)[:_STEPS] if count >= _LEAST)
 
 
 def render_slope(errors: Mapping[int, np.ndarray], level: float = 0.95) -> Interval:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from clvol.lab.comparison.figures import ALPHA, COSTS, LEVEL, Efficiency, Figures
 from clvol.lab.comparison.measure import is_low_discrepancy
+from clvol.lab.comparison.shorter import slope_spp
 from clvol.lab.digits import with_ends
 
 if TYPE_CHECKING:
@@ -131,7 +132,7 @@ def _render_slope(figures: Figures) -> str:
     elif slope.low > -1:
         meaning = "slower than the -1 of independent samples"
     return (
-        f"The MSE of one render of {figures.label} falls over its samples, {min(measured.shorter)} to "
+        f"The MSE of one render of {figures.label} falls over its samples, {min(slope_spp(measured.spp))} to "
         f"{measured.spp} spp, with slope {slope.value:.2f} (95 %: {slope.low:.2f} to {slope.high:.2f}), "
         f"{meaning}."
     )
