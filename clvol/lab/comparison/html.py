@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from clvol.lab.comparison.figures import ALPHA
 from clvol.lab.comparison.flip import HINT
-from clvol.lab.comparison.pictures import error_picture, error_scale, picture, round_pictures, round_scales
+from clvol.lab.comparison.pictures import error_picture, error_scales, picture, round_pictures, round_scales
 from clvol.lab.comparison.relative import DARK, relative_weight
 from clvol.lab.comparison.style import CSS, SCRIPT
 from clvol.lab.comparison.table import has_flip_errors, table_rows
@@ -135,9 +135,11 @@ def _img(png: bytes, alt: str, attributes: str = "") -> str:
 
 def _pictures(findings: Findings) -> str:
     """A column for each combination: its picture, its error, its FLIP error."""
-    scale, flips = error_scale(findings), has_flip_errors(findings)
+    (scale, flip_scale), flips = error_scales(findings), has_flip_errors(findings)
     keys = [f"Below: error of each pixel, relative{_scale('magma', '0', f'{scale:.2g}')}"]
-    keys += [f"At the bottom: FLIP error{_scale('magma', '0', '1')}"] if flips else [escape(HINT)]
+    keys += (
+        [f"At the bottom: FLIP error{_scale('magma', '0', f'{flip_scale:.2g}')}"] if flips else [escape(HINT)]
+    )
     key = f'<div class="key">{"".join(f"<div>{text}</div>" for text in keys)}</div>'
     truth = _img(picture(findings.reference.image), "reference", ' id="reference"')
     said = f"{findings.reference.spp} spp" if findings.reference.spp else "as given"
@@ -156,7 +158,7 @@ def _pictures(findings: Findings) -> str:
         images = [_img(picture(shown.render.image), label, ' class="shown"')]
         images.append(_img(error_picture(shown.error, scale), f"error of {label}"))
         if shown.flip is not None:
-            images.append(_img(error_picture(shown.flip, 1.0), f"FLIP error of {label}"))
+            images.append(_img(error_picture(shown.flip, flip_scale), f"FLIP error of {label}"))
         cards.append(
             f"<figure><figcaption><strong>{label}</strong>{words}</figcaption>{''.join(images)}</figure>"
         )

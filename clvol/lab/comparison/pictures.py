@@ -20,9 +20,13 @@ def picture(image: np.ndarray) -> bytes:
     return _pixels(display(image))
 
 
-def error_scale(findings: Findings) -> float:
-    """What the error images of pictures at equal time end at: 99 of 100 pixels of the noisiest are below."""
-    return _largest([f.picture.error for f in findings.figures])
+def error_scales(findings: Findings) -> tuple[float, float]:
+    """What the error and FLIP images of pictures at equal time end at.
+
+    99 of 100 pixels of the noisiest are below.
+    """
+    flips = [f.picture.flip for f in findings.figures if f.picture.flip is not None]
+    return _largest([f.picture.error for f in findings.figures]), _largest(flips)
 
 
 def error_picture(error: np.ndarray, scale: float) -> bytes:
