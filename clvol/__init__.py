@@ -19,7 +19,8 @@ from clvol.version import __version__
 if TYPE_CHECKING:
     from types import FrameType
 
-    from clvol.api import plan, render
+    from clvol.api.frames import Frame, Frames, progressive
+    from clvol.api.renders import plan, render
     from clvol.errors import DeviceError, Error, OptionError, RenderError, SceneError, VolumeError
     from clvol.lab.comparison import Comparison, compare
     from clvol.lab.ray.trace import trace_ray
@@ -36,6 +37,8 @@ __all__ = [
     "Comparison",
     "DeviceError",
     "Error",
+    "Frame",
+    "Frames",
     "OptionError",
     "Plan",
     "RayView",
@@ -52,6 +55,7 @@ __all__ = [
     "look_at",
     "merge",
     "plan",
+    "progressive",
     "render",
     "rotate",
     "scale",
@@ -61,7 +65,8 @@ __all__ = [
 ]
 
 _MODULES = {
-    "clvol.api": ["plan", "render"],
+    "clvol.api.frames": ["Frame", "Frames", "progressive"],
+    "clvol.api.renders": ["plan", "render"],
     "clvol.errors": ["DeviceError", "Error", "OptionError", "RenderError", "SceneError", "VolumeError"],
     "clvol.lab.comparison": ["Comparison", "compare"],
     "clvol.lab.ray.trace": ["trace_ray"],

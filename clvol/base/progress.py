@@ -7,10 +7,14 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
-from typing import IO, TYPE_CHECKING, Any, cast
+from dataclasses import dataclass, field
+from functools import cache
+from typing import IO, TYPE_CHECKING, Any, NoReturn, Protocol, Self, cast
+
+from clvol.errors import OptionError
 
 if TYPE_CHECKING:
+    import numpy as np
     from rich.console import Console
     from rich.progress import Progress as RichBar
     from rich.progress import ProgressColumn, TaskID
@@ -20,9 +24,67 @@ _READING_PACE = 20.0
 """Times what a reading of the noise took that passes before the next."""
 
 
+class Seen(Protocol):
+    """The picture so far, as `clvol.picture.result.Result` has it."""
+
+    @property
+    def image(self) -> np.ndarray:
+        """Mean linear radiance, float32 (height, width, 3)."""
+
+    @property
+    def noise(self) -> float:
+        """Mean relative standard error of the image; nan while unknown."""
+
+
+class Glance:
+    """The picture so far, made when it is first asked for, in the block in which a callback may ask.
+
+    After it the film goes on, and there is no such picture any more; its noise stays known.
+
+    Parameters
+    ----------
+    make : makes the picture; None while no pixel has a sample.
+    callback : for whom; a bar reads the noise when it likes, for others it is known at the end of the block.
+    """
+
+    def __init__(self, make: Callable[[], Seen | None], callback: ProgressCallback) -> None:
+        self._make: Callable[[], Seen | None] = cache(make)
+        self._self_paced = getattr(callback, "self_paced", False)
+        self._noise: float | None = None
+        self._image: np.ndarray | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        if not (self._self_paced or any(exception)):
+            self.noise()
+        self._make = _closed
+
+    def image(self) -> np.ndarray | None:
+        """The picture's; None while there is none.  OptionError after the block, if it is asked for late."""
+        if self._image is None and (seen := self._make()) is not None:
+            self._image = seen.image
+        return self._image
+
+    def noise(self) -> float:
+        """The picture's; nan while unknown."""
+        if self._noise is None:
+            seen = self._make()
+            self._noise = math.nan if seen is None else seen.noise
+        return self._noise
+
+
+def _closed() -> NoReturn:
+    raise OptionError(
+        "a progress record shows its picture only while the callback runs",
+        hint="take the image there, or iterate over clvol.progressive",
+    )
+
+
 @dataclass(frozen=True)
 class Progress:
-    """How far a render is.
+    """How far a render is, and in a callback what its picture is so far: `image` and `noise`.
 
     Parameters
     ----------
@@ -34,19 +96,31 @@ class Progress:
         Time since the first launch.
     time_limit : float or None
         Seconds after which no new sample is begun.
-    noise : float
-        Mean relative standard error of the image so far (`clvol.picture.result.relative_noise`); nan while
-        unknown.  Where reading it for each record would cost much, foreseen from the last one read.
     what : str
         What is going on; samples are those of the picture only while it is "rendering", else steps.
+    glance : Glance or None
+        At the picture so far.
     """
 
     samples_done: int
     samples_total: int | None
     seconds: float
     time_limit: float | None = None
-    noise: float = math.nan
     what: str = "rendering"
+    glance: Glance | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def image(self) -> np.ndarray | None:
+        """Mean linear radiance of the samples done, float32 (height, width, 3); None before the first.
+
+        It is read from the device when it is asked for, which the callback must do.
+        """
+        return None if self.glance is None else self.glance.image()
+
+    @property
+    def noise(self) -> float:
+        """Mean relative standard error of that image (`clvol.Result.noise`); nan while unknown."""
+        return math.nan if self.glance is None else self.glance.noise()
 
     @property
     def fraction(self) -> float:
@@ -74,28 +148,26 @@ ProgressCallback = Callable[[Progress], None]
 """What ``clvol.render(progress=...)`` accepts besides True and False."""
 
 
-class FilmNoise:
-    """The noise of the picture so far, at a small share of the render's time.
+class PacedNoise:
+    """The noise of the picture so far, at a small share of the render's time: what a bar shows.
 
-    It is read from the film as long as that takes no more than a twentieth of the time; passes between two
-    readings are told what the last one becomes by so many more samples, of independent errors.
-
-    read : noise of the film, given the samples per pixel that it has.
+    It is read as long as that takes no more than a twentieth of the time; between two readings it is what the
+    last one becomes by so many more samples, of independent errors.
     """
 
-    def __init__(self, read: Callable[[int], float], clock: Callable[[], float] = time.perf_counter) -> None:
-        self._read, self._clock = read, clock
+    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
+        self._clock = clock
         self._noise, self._samples = math.nan, 0
         self._due = -math.inf
 
-    def after(self, samples: int, exact: bool = False) -> float:
-        """The noise after so many samples per pixel; read whatever it costs where it has to be exact."""
+    def of(self, record: Progress) -> float:
+        """The noise at a record; read whatever it costs at the last one."""
         start = self._clock()
-        if exact or start >= self._due:
-            self._noise, self._samples = self._read(samples), samples
+        if start >= self._due or record.samples_done == record.samples_total:
+            self._noise, self._samples = record.noise, record.samples_done
             end = self._clock()
             self._due = end + _READING_PACE * (end - start)
-        return self._noise * math.sqrt(self._samples / samples)
+        return self._noise * math.sqrt(self._samples / max(record.samples_done, 1))
 
 
 def format_samples(record: Progress) -> str:
@@ -165,8 +237,11 @@ class RichProgress:
     Use it as a context manager and call it with each `Progress` record.
     """
 
+    self_paced = True
+
     def __init__(self, console: Console | None = None) -> None:
         self.console = console or error_console()
+        self._noise = PacedNoise()
         self._bar: RichBar | None = None
         self._task: TaskID | None = None
 
@@ -185,7 +260,7 @@ class RichProgress:
 
     def __call__(self, record: Progress) -> None:
         """Show where the render is."""
-        if self._bar is None or self._task is None:
+        if self._bar is None or self._task is None or self._bar.disable:
             return
         self._bar.update(
             self._task,
@@ -193,7 +268,7 @@ class RichProgress:
             completed=record.fraction,
             samples=format_samples(record),
             left=format_seconds(record.seconds_left),
-            noise=format_noise(record.noise),
+            noise=format_noise(self._noise.of(record)),
         )
 
     def __exit__(self, *_exception: object) -> None:

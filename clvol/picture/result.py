@@ -129,7 +129,7 @@ class Result:
         (first, _), spp = self.ranges[0], self.samples[1]
         extent = f"{spp} spp from sample {first} on" if first else f"{spp} spp"
         about = f"{width} x {height}, {extent}, noise {self.noise:.2%}"
-        return f"<Result {', '.join([about, *how])}>"
+        return f"<{type(self).__name__} {', '.join([about, *how])}>"
 
     @property
     def dof(self) -> int:

@@ -15,11 +15,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.base.progress import Progress, ProgressCallback
+from clvol.base.progress import Glance, Progress, ProgressCallback
 from clvol.picture.result import relative_noise
+from clvol.rendering.outcome import make_result
 from clvol.rendering.session import MAX_SAMPLES, Session, nothing_finished, seed_words
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from clvol.picture.result import Result
     from clvol.rendering.film import Film
 
 log = logging.getLogger("clvol")
@@ -178,6 +182,18 @@ class TargetRender:
         interrupted: Callable[[], int],
     ) -> int:
         """Render until the survey says that the error is below the target; return the mean of the samples."""
+        mean = 0
+        for mean in self.steps(time_limit, callback, interrupted):  # noqa: B007
+            pass
+        return mean
+
+    def steps(
+        self,
+        time_limit: float | None,
+        callback: ProgressCallback | None,
+        interrupted: Callable[[], int],
+    ) -> Iterator[int]:
+        """As `run`, and stop whenever the picture, which the session then shows, has more samples."""
         self.started = time.perf_counter()
         self.time_limit, self.callback, self.interrupted = time_limit, callback, interrupted
         everywhere, final = np.ones(self.wavefront.pixels, np.int64), False
@@ -187,13 +203,18 @@ class TargetRender:
                 plan, final = self._plan()
                 self._add(self.picture, plan.min() * everywhere)  # an early end leaves no pixel without
                 self._add(self.picture, plan)
+                if not final and self.picture.samples.all():
+                    yield self._mean_samples()
         if not self.picture.samples.all():  # not even the survey was finished in time
             self._add(self.picture, CHUNK * everywhere)
         if not self.picture.samples.all():
-            raise nothing_finished(interrupted())
+            raise nothing_finished(self.interrupted())
         self.wavefront.use_film(self.picture)
-        self.session.seconds = time.perf_counter() - self.started
         self._report_end()
+        yield self._mean_samples()
+
+    def _mean_samples(self) -> int:
+        self.session.seconds = time.perf_counter() - self.started
         return round(float(self.picture.samples.mean()))
 
     def _next_survey(self) -> int:
@@ -248,45 +269,46 @@ class TargetRender:
                 return
             if len(pixels):
                 self.wavefront.list_pixels(pixels)
-                tell = lambda progressed, at=pixels: self._tell(film, at, progressed.samples_done, goal)  # noqa: E731
-                film.samples[pixels] += self.wavefront.run(0, 1 << bit, self._stopped, tell)
+                had = film.samples[pixels]
+                for done in self.wavefront.passes(0, 1 << bit, self._stopped):
+                    film.samples[pixels] = had + done
+                    self._tell(film, goal)
 
     def _stopped(self) -> int:
         late = self.time_limit is not None and time.perf_counter() - self.started >= self.time_limit
         return max(late, self.interrupted())
 
-    def _tell(self, film: Film, pixels: np.ndarray, added: int, goal: np.ndarray) -> None:
-        """Report that `added` samples of `pixels`, not yet counted by `film`, are finished."""
+    def _tell(self, film: Film, goal: np.ndarray) -> None:
+        """Report that samples are finished."""
         if self.callback is None:
             return
-        counts, survey = self.picture.samples, int(self.survey.samples[0])
-        if film is self.picture:
-            counts = counts.copy()
-            counts[pixels] += added
-        else:
-            survey += added
-        done, expected = int(counts.mean()), self.expected
-        total = None if expected is None else max(int(expected), done)
-        surveys = max(int(self.survey.samples[0]), int((expected or 0) / SURVEY_SHARE))
+        done, expected = int(self.picture.samples.mean()), self.expected
+        survey = int(self.survey.samples.min())
+        surveys = max(survey, int((expected or 0) / SURVEY_SHARE))
         if film is self.survey:
             surveys = max(surveys, int(goal[0]))
-        self.callback(
-            TargetProgress(
-                done,
-                total,
-                time.perf_counter() - self.started,
-                self.time_limit,
-                self._expected_noise(counts),
-                "rendering" if film is self.picture else "survey",
-                (survey, surveys),
+        with Glance(self._so_far, self.callback) as glance:
+            self.callback(
+                TargetProgress(
+                    done,
+                    None if expected is None else max(int(expected), done),
+                    time.perf_counter() - self.started,
+                    self.time_limit,
+                    "rendering" if film is self.picture else "survey",
+                    glance,
+                    (survey, surveys),
+                )
             )
-        )
 
-    def _expected_noise(self, counts: np.ndarray) -> float:
-        """What the last survey says of a picture with so many samples; nan where it says nothing."""
-        if self.level == 0.0 or not counts.all():
-            return float("nan")
-        return float((self.noise / np.sqrt(counts)).sum()) / self.level
+    def _so_far(self) -> Result | None:
+        """The picture, whatever film is rendered to; None while it has no samples."""
+        if not self.picture.samples.all():
+            return None
+        film = self.wavefront.film
+        self.wavefront.use_film(self.picture)
+        result = make_result(self.session, 0, self._mean_samples(), final=False)
+        self.wavefront.use_film(film)
+        return result
 
     def _report_end(self) -> None:
         estimate = self.picture.uneven_estimate()

@@ -10,7 +10,6 @@ import numpy as np
 from clvol import layout
 from clvol.picture.result import Result, said_ranges
 from clvol.planning import registry
-from clvol.scene.digest import scene_digest
 from clvol.version import __version__
 
 if TYPE_CHECKING:
@@ -22,8 +21,11 @@ LARGE_WEIGHT = 100.0
 """Paths that weigh so much more than others are rare: few samples do not show them."""
 
 
-def make_result(session: Session, first: int, count: int) -> Result:
-    """The film as a Result; of samples `first` to `first + count`, or of as many as each listed pixel got."""
+def make_result(session: Session, first: int, count: int, final: bool = True) -> Result:
+    """The film as a Result; of samples `first` to `first + count`, or of as many as each listed pixel got.
+
+    What is wrong with it is logged, unless more is to come: where it is not `final`.
+    """
     film, window = session.wavefront.film, session.prepared.scene.film.window
     shape = window[3], window[2]
     estimate: Estimate
@@ -38,7 +40,10 @@ def make_result(session: Session, first: int, count: int) -> Result:
         estimate.reshaped(*shape, 3), (first, count), aovs, stats, _metadata(session, first, samples)
     )
     result.component_format = session.prepared.scene.film.component_format
-    _warn_of_unseen(session, result)
+    if final:
+        _warn(session, stats)
+        _warn_of_unseen(session, result)
+        _log_seconds(session)
     return result
 
 
@@ -62,7 +67,7 @@ def _metadata(session: Session, first: int, samples: np.ndarray) -> dict[str, An
     even = samples.min() == samples.max()
     return {
         "scene": scene.source,
-        "digest": scene_digest(scene),
+        "digest": session.digest,
         **plan.in_force,
         **({"majorant_scale": scale} if scale != 1 else {}),
         **({"biased": ", ".join(biased), "step": plan.choices.step or "voxel"} if biased else {}),
@@ -138,7 +143,7 @@ def _first_hit(session: Session, name: str, paths: np.ndarray) -> np.ndarray:
 
 
 def statistics(session: Session, samples: int) -> dict[str, Any]:
-    """What `samples` samples, over all pixels, cost and met; what went wrong is logged."""
+    """What `samples` samples, over all pixels, cost and met."""
     wavefront, film = session.wavefront, session.wavefront.film
     slots = wavefront.slot_statistics()
     peaks = {n: float(p.max(initial=0.0)) for n, p in film.peaks_by_pixel().items()}
@@ -174,15 +179,18 @@ def statistics(session: Session, samples: int) -> dict[str, Any]:
         "paths_cut_by_max_depth": int(slots.get("cut", 0)),
         "energy_lost_to_caps": slots.get("cut_energy", 0.0) / max(paths, 1),
     }
-    _warn(session, stats)
+    return stats
+
+
+def _log_seconds(session: Session) -> None:
+    """Where the time went."""
     log.info(
         "set-up (volumes, majorants, kernels)  %8.3f seconds, %.3f of them for kernels",
         session.setup_seconds,
         session.kernel_seconds,
     )
-    for stage, seconds in wavefront.seconds.items():
+    for stage, seconds in session.wavefront.seconds.items():
         log.info("stage %-20s %8.3f seconds", stage, seconds)
-    return stats
 
 
 def _warn(session: Session, stats: dict[str, Any]) -> None:

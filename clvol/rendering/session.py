@@ -5,30 +5,30 @@ from __future__ import annotations
 import logging
 import time
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from clvol import layout
 from clvol.base.arguments import check_seed
-from clvol.base.progress import FilmNoise, Progress, ProgressCallback
 from clvol.device.programs import build_stages, stage_units
 from clvol.device.side_builds import SideBuilds
 from clvol.errors import RenderError
-from clvol.picture.result import relative_noise
 from clvol.planning.in_force import warnings
 from clvol.planning.plan import Plan
 from clvol.planning.settled import Tuning
 from clvol.rendering.light_cache import light_cache_unit
 from clvol.rendering.profiler import Profiler, timed
 from clvol.rendering.upload import upload_scene
-from clvol.rendering.wavefront import Pool, Progressed, Wavefront
+from clvol.rendering.wavefront import Pool, Wavefront
+from clvol.scene.digest import scene_digest
 from clvol.tables.camera import camera_rays
 from clvol.tables.pixel_filter import FILTER_BINS
 from clvol.tables.prepare import PreparedScene, prepare
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from clvol.device.device import Device
     from clvol.planning.choices import Choices
@@ -132,6 +132,11 @@ class Session:
         """What is compiled, launched and allocated."""
         return self.prepared.plan
 
+    @cached_property
+    def digest(self) -> str:
+        """Tells the scene from others."""
+        return scene_digest(self.prepared.scene)
+
     def restart(self, seed: int) -> None:
         """Forget the picture; the next run draws another seed's samples with the same kernels and buffers."""
         self.seed = seed
@@ -161,35 +166,39 @@ class Session:
         first: int,
         count: int,
         time_limit: float | None = None,
-        callback: ProgressCallback | None = None,
         interrupted: Callable[[], int] = lambda: 0,
     ) -> int:
-        """Render samples; returns how many of each pixel were done.
-
-        `interrupted` says how urgently an end is asked for, as `Wavefront.run` takes it.
-        """
-        started = time.perf_counter()
-        total = count if count < MAX_SAMPLES else None
-        noise = FilmNoise(lambda done: self._noise(first, done))
-
-        def should_stop() -> int:
-            return max(interrupted(), time_limit is not None and time.perf_counter() - started >= time_limit)
-
-        def report(progressed: Progressed) -> None:
-            if callback is not None:
-                done = progressed.samples_done
-                noise_now = noise.after(done, exact=done == total)
-                callback(Progress(done, total, progressed.seconds, time_limit, noise_now))
-
-        done = self.wavefront.run(first, count, should_stop, report)
-        if done == 0:
-            raise nothing_finished(interrupted())
-        self.seconds = time.perf_counter() - started
+        """Render samples; returns how many of each pixel were done, as `passes`."""
+        done = 0
+        for done in self.passes(first, count, time_limit, interrupted):  # noqa: B007
+            pass
         return done
 
-    def _noise(self, first: int, count: int) -> float:
-        estimate = self.wavefront.film.estimate(first, count)
-        return relative_noise(*estimate.mean_and_variance(), estimate.dof)
+    def passes(
+        self, first: int, count: int, time_limit: float | None, interrupted: Callable[[], int]
+    ) -> Iterator[int]:
+        """Render samples, and stop wherever the film has more: at how many of each pixel are done.
+
+        `interrupted` says how urgently an end is asked for, as `Wavefront.passes` takes it.  Time that goes
+        elsewhere meanwhile does not count.  Nothing finished is an error.
+        """
+        started, apart = time.perf_counter(), 0.0
+        done = 0
+
+        def spent() -> float:
+            return time.perf_counter() - started - apart
+
+        def should_stop() -> int:
+            return max(interrupted(), time_limit is not None and spent() >= time_limit)
+
+        for done in self.wavefront.passes(first, count, should_stop):
+            self.seconds = spent()
+            left = time.perf_counter()
+            yield done
+            apart += time.perf_counter() - left
+        if done == 0:
+            raise nothing_finished(interrupted())
+        self.seconds = spent()
 
 
 def nothing_finished(urgency: int) -> BaseException:

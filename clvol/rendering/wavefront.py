@@ -24,7 +24,7 @@ from clvol.rendering.handled import Handled
 from clvol.rendering.profiler import timed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from clvol.device.device import Device
     from clvol.planning.plan import Plan
@@ -67,14 +67,6 @@ class Pool:
         groups = max(1, -(-slots // plan.tuning.group_slots))
         slots = groups * plan.tuning.group_slots
         return cls(slots, pass_jobs=4 * slots, ring_jobs=32 * slots)
-
-
-@dataclass
-class Progressed:
-    """What the schedule reports between batches."""
-
-    samples_done: int
-    seconds: float
 
 
 class Wavefront:
@@ -199,44 +191,29 @@ class Wavefront:
             entries = np.stack([chosen, self.film.samples[chosen]], axis=1).astype(np.uint32)
             self._write("pixel_list", entries)
 
-    def run(
-        self,
-        first: int,
-        count: int,
-        should_stop: Callable[[], int],
-        report: Callable[[Progressed], None],
-    ) -> int:
-        """Render samples `first` .. `first + count` of every pixel listed; return how many were done.
+    def passes(self, first: int, count: int, should_stop: Callable[[], int]) -> Iterator[int]:
+        """Render samples `first` .. `first + count` of every pixel listed; how many, whenever it is more.
 
         `should_stop` is asked between batches.  Once it says 1 no new pass is begun, and the passes in
         flight are finished, not dropped (dropping favours short paths), as long as patience lasts; at 2 only
-        what is finished is kept.
+        what is finished is kept, with a warning, and at 3 without.  So it is where the iterator is closed.
         """
         done = 0
-        start = time.perf_counter()
         self._stopping_since: float | None = None
         per_round = max(1, _MAX_ROUND_JOBS // (self.pass_samples * self.sample_jobs)) * self.pass_samples
         while done < count and not (done and should_stop()):
-            part = min(count - done, per_round)
-
-            def tell(n: int, base: int = done) -> None:
-                report(Progressed(base + n, time.perf_counter() - start))
-
-            finished = self._run_round(first + done, part, should_stop, tell, done > 0)
+            part, finished = min(count - done, per_round), 0
+            for finished in self._round(first + done, part, should_stop, done > 0):
+                yield done + finished
             done += finished
             if finished < part:
                 break
-        return done
 
-    def _run_round(
-        self,
-        first: int,
-        count: int,
-        should_stop: Callable[[], int],
-        report: Callable[[int], None],
-        earlier: bool,
-    ) -> int:
-        """One numbering of jobs: fewer than 2³¹ of them; `earlier`: a round before has samples."""
+    def _round(self, first: int, count: int, should_stop: Callable[[], int], earlier: bool) -> Iterator[int]:
+        """One numbering of jobs, fewer than 2³¹ of them: how many samples are done, whenever it is more.
+
+        `earlier`: a round before has samples.
+        """
         passes = -(-count // self.pass_samples)
         samples = [self.pass_samples] * passes
         samples[-1] = count - (passes - 1) * self.pass_samples
@@ -244,29 +221,35 @@ class Wavefront:
         self._start_round(first, pass_jobs, passes - 1, samples[-1])
         begun = finished = 0
         waves = 1
-        while True:
-            urgency = should_stop() if begun else 0
-            allowed = begun if urgency else min(passes, finished + self.ring_passes)
-            limit = sum(samples[:allowed]) * self.sample_jobs
-            self._allow(limit)
-            with timed(self.profiler, "waves"):
-                launched, elapsed, counters = self._launch(waves)
-            waves = int(np.clip(launched * _BATCH_SECONDS / max(elapsed, 1e-6), 1, max(2 * launched, 4)))
-            if time.perf_counter() - self._harvested > _HARVEST_SECONDS:
-                self._harvest()
-            begun = min(allowed, -(-int(counters[_NEXT_JOB]) // pass_jobs))
-            while finished < begun:
-                place = finished % self.ring_passes
-                if counters[_DONE + place] != samples[finished] * self.sample_jobs:
-                    break
-                self._accumulate(place, samples[finished], first + finished * self.pass_samples)
-                finished += 1
-                report(sum(samples[:finished]))
-            if finished == passes or (finished == begun and begun and should_stop()):
-                return sum(samples[:finished])
-            if self._out_of_patience(urgency, finished > 0 or earlier):
-                self._abandon(begun - finished)
-                return sum(samples[:finished])
+        idle = False
+        try:
+            while True:
+                urgency = should_stop() if begun else 0
+                allowed = begun if urgency else min(passes, finished + self.ring_passes)
+                self._allow(sum(samples[:allowed]) * self.sample_jobs)
+                with timed(self.profiler, "waves"):
+                    launched, elapsed, counters = self._launch(waves)
+                waves = int(np.clip(launched * _BATCH_SECONDS / max(elapsed, 1e-6), 1, max(2 * launched, 4)))
+                if time.perf_counter() - self._harvested > _HARVEST_SECONDS:
+                    self._harvest()
+                begun = min(allowed, -(-int(counters[_NEXT_JOB]) // pass_jobs))
+                while finished < begun:
+                    place = finished % self.ring_passes
+                    if counters[_DONE + place] != samples[finished] * self.sample_jobs:
+                        break
+                    self._accumulate(place, samples[finished], first + finished * self.pass_samples)
+                    finished += 1
+                    yield sum(samples[:finished])
+                idle = finished == passes or bool(finished == begun and begun and should_stop())
+                if idle:
+                    return
+                if self._out_of_patience(urgency, finished > 0 or earlier):
+                    if urgency <= 2:
+                        log.warning("dropped %d unfinished passes, whose paths did not end", begun - finished)
+                    return
+        finally:
+            if not idle:
+                self._abandon()
 
     def _out_of_patience(self, urgency: int, some_finished: bool) -> bool:
         """Whether paths in flight are no longer waited for."""
@@ -278,9 +261,8 @@ class Wavefront:
         patience = _PATIENCE_SECONDS if some_finished else _FIRST_PATIENCE_SECONDS
         return urgency > 1 or now - self._stopping_since > patience
 
-    def _abandon(self, passes: int) -> None:
+    def _abandon(self) -> None:
         """Give up the paths in flight, and with them the passes that they belong to."""
-        log.warning("dropped %d unfinished passes, whose paths did not end", passes)
         fresh = {"job": layout.NO_JOB, "leg": 0, "shadow_leg": 0}
         for row, field in enumerate(self.fields):
             if field.name in fresh:

@@ -89,7 +89,7 @@ def test_options_are_refused_before_a_device_is_opened(monkeypatch):
     def no_device(pattern):
         raise AssertionError("opened")
 
-    monkeypatch.setattr("clvol.api.open_device", no_device)
+    monkeypatch.setattr("clvol.api.order.open_device", no_device)
     for options in ({"majorant": "oct"}, {"spp": 0}, {"seed": -1}, {"time_limit": 0}):
         with pytest.raises(OptionError):
             clvol.render(scene(), **options)

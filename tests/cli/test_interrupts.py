@@ -16,7 +16,7 @@ from click.testing import CliRunner, Result
 from signals import press_key
 
 import clvol
-from clvol import api
+from clvol.api import order
 from clvol.base import interrupts, output_files
 from clvol.base.progress import Progress, RichProgress
 from clvol.cli.main import main
@@ -113,7 +113,7 @@ def test_signals_after_the_last_sample_lose_nothing(
         return pressed
 
     if moment == "after the last sample":
-        monkeypatch.setattr(api, "make_result", pressed_before(api.make_result))
+        monkeypatch.setattr(order, "make_result", pressed_before(order.make_result))
     else:
         monkeypatch.setattr(output_files.os, "replace", pressed_before(os.replace))
     outcome = render(tmp_path, "--spp", "3")

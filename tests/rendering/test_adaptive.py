@@ -23,6 +23,7 @@ import clvol
 from clvol.cli.main import main
 from clvol.errors import OptionError
 from clvol.picture.estimate import error_bias
+from clvol.picture.result import relative_noise
 from clvol.planning.choices import Choices
 from clvol.rendering import adaptive
 from clvol.rendering.adaptive import (
@@ -194,7 +195,8 @@ def in_lists(session, seed, samples):
         pixels = left[: random.integers(1, len(left) + 1)]
         count = int(min(random.integers(1, samples), (samples - film.samples[pixels]).min()))
         wavefront.list_pixels(pixels)
-        film.samples[pixels] += wavefront.run(0, count, lambda: False, lambda _: None)
+        *_, done = wavefront.passes(0, count, lambda: 0)
+        film.samples[pixels] += done
     session.seconds = 1.0
     return make_result(session, 0, samples)
 
@@ -471,7 +473,9 @@ def test_progress_tells_survey_and_picture_and_never_goes_back(half):
     last = records[-1]
     assert last.samples_done == last.samples_total == int(render.picture.samples.mean())
     assert last.fraction == 1 and last.seconds_left == 0
-    assert last.noise == pytest.approx(0.005, rel=0.05)
+    estimate = render.picture.uneven_estimate()
+    assert last.noise == pytest.approx(relative_noise(*estimate.mean_and_variance(), estimate.dof), rel=1e-5)
+    assert last.noise <= 1.05 * 0.005
 
 
 def test_the_time_left_counts_the_surveys():

@@ -98,7 +98,7 @@ def test_the_host_is_asked_after_a_bounded_number_of_steps(device, kind):
         return least()
 
     with contextlib.suppress(KeyboardInterrupt):  # raised where no pass was finished
-        session.run(0, 1 << 20, None, None, ask)
+        session.run(0, 1 << 20, None, ask)
     items = runs.groups * plan.tuning.local_size
     at_hand = max(lanes(plan).values(), default=1)
     assert 0 < most[0] <= 2 * items * (STAGE_STEPS + at_hand * WALK_STEPS)
@@ -109,11 +109,9 @@ def test_a_second_interrupt_keeps_finished_passes_and_leaves_nothing_behind(devi
     session = session_of(device, "sheets", pool=None)
     finished = []
 
-    def ask():
-        return 2 if finished else 0
-
-    done = session.run(0, 1 << 20, None, finished.append, ask)
-    assert done == finished[-1].samples_done > 0
+    for done in session.passes(0, 1 << 20, None, lambda: 2 if finished else 0):
+        finished.append(done)
+    assert done == finished[-1] > 0
     cut = make_result(session, 0, done)
     session.restart(1)
     assert session.run(0, done) == done

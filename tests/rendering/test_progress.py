@@ -8,7 +8,20 @@ import math
 import pytest
 from rich.console import Console
 
-from clvol.base.progress import Progress, RichProgress, format_noise, format_samples, format_seconds
+from clvol.base.progress import Glance, Progress, RichProgress, format_noise, format_samples, format_seconds
+
+
+class Seen:
+    """A picture of which only the noise is looked at."""
+
+    image = None
+
+    def __init__(self, noise: float) -> None:
+        self.noise = noise
+
+
+def at_noise(noise: float) -> Glance:
+    return Glance(lambda: Seen(noise), print)
 
 
 def test_time_left_follows_the_pace_of_the_samples() -> None:
@@ -53,7 +66,7 @@ def test_bar_shows_samples_time_left_and_noise_on_a_terminal() -> None:
     screen = io.StringIO()
     console = Console(file=screen, force_terminal=True, width=100)
     with RichProgress(console) as progress:
-        progress(Progress(16, 64, 8.0, noise=0.012))
+        progress(Progress(16, 64, 8.0, glance=at_noise(0.012)))
         progress._bar.refresh()
     assert "16/64 spp  24 s left  noise 1.2 %" in screen.getvalue()
 

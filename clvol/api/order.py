@@ -1,0 +1,235 @@
+"""What a caller asked of a render: checked at once, planned, and opened on a device."""
+
+from __future__ import annotations
+
+import logging
+import math
+import operator
+import time
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from clvol.base.arguments import check_seed, positive
+from clvol.base.progress import Glance, Progress
+from clvol.device.device import open_device
+from clvol.errors import OptionError, shown
+from clvol.planning import registry
+from clvol.planning.choices import Choices
+from clvol.planning.plan import Plan
+from clvol.rendering.adaptive import TargetRender
+from clvol.rendering.outcome import make_result
+from clvol.rendering.profiler import timed
+from clvol.rendering.session import MAX_SAMPLES, Session
+from clvol.scene.records import Scene
+from clvol.scene.views import viewed
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+    from clvol.base.progress import ProgressCallback
+    from clvol.device.device import Device
+    from clvol.lab.pilot import Found
+    from clvol.picture.result import Result
+    from clvol.rendering.profiler import Profiler
+
+log = logging.getLogger("clvol")
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """What to render, and how.
+
+    Parameters
+    ----------
+    asked : names by family, as they were given.
+    choices : of them, and of the scene's own.
+    piloted : a pilot is to choose technique, transmittance and majorant.
+    first, count : samples of each pixel; `spp` is what was given instead.
+    """
+
+    scene: Scene
+    asked: dict[str, str]
+    choices: Choices
+    piloted: bool
+    first: int
+    count: int
+    spp: int | None
+    seed: int
+    time_limit: float | None
+    sensor: int | None
+    size: tuple[int, int] | None
+    device: str | None
+    pool: int | None
+
+    @classmethod
+    def of(cls, function: str, scene: object, given: Mapping[str, Any]) -> Order:
+        """Check what `function` was given: a scene, and the options of `clvol.render` by name.
+
+        Raises
+        ------
+        OptionError, SceneError
+            Something that won't do, as far as can be told without a device.
+        """
+        scene = viewed(check_scene(function, scene), given["sensor"], given["size"])
+        asked = {family: given[family] for family in registry.FAMILIES}
+        for family, name in asked.items():
+            registry.check_choice(family, name, pilot=True)
+        piloted = asked["technique"] == registry.PILOT
+        if piloted:
+            asked["technique"] = "auto"
+        numbers = {name: given[name] for name in ("majorant_scale", "step", "target_error", "aov")}
+        choices = Choices.for_scene(scene, asked, **numbers)
+        if piloted:
+            choices = choices.but(technique="auto")  # the scene's own technique too is put to the test
+        if choices.target_error is not None and given["samples"] is not None:
+            raise OptionError("target_error and samples exclude each other", hint="spp says how many at most")
+        spp, time_limit = given["spp"], given["time_limit"]
+        first, count = _sample_range(scene, spp, time_limit, given["samples"])
+        seed = check_seed(scene.seed if given["seed"] is None else given["seed"])
+        extent = first, count, spp, seed, time_limit
+        view = given["sensor"], given["size"]
+        return cls(scene, asked, choices, piloted, *extent, *view, given["device"], given["pool"])
+
+    def open(self, callback: ProgressCallback | None, profiler: Profiler | None = None) -> Opened:
+        """Plan it, and make it ready on the device; `callback` is told of a pilot."""
+        started = time.perf_counter()
+        with timed(profiler, "plan"):
+            plan = Plan.of(self.scene, self.choices)
+        spent = time.perf_counter() - started
+        with timed(profiler, "device"):
+            device = open_device(self.device)
+        found = None
+        if self.piloted:
+            with timed(profiler, "pilot"):
+                found = self._pilot(device, callback)
+            log.info("pilot: %s; %s", ", ".join(f"{k} {v}" for k, v in found.names.items()), found.reason)
+            reasons = dict.fromkeys(found.names, "chosen by the pilot")
+            plan = plan.having(self.choices.but(**found.names), reasons)
+        session = Session.for_plan(device, self.scene, plan, self.seed, self.pool, spent, profiler)
+        session.describe()
+        session.warn(self.asked)
+        return Opened(self, session, found)
+
+    def _pilot(self, device: Device, callback: ProgressCallback | None) -> Found:
+        """What a pilot makes of the choices."""
+        from clvol.lab.pilot import pilot
+
+        started = time.perf_counter()
+
+        def tell(done: int, total: int) -> None:
+            if callback is not None:
+                callback(Progress(done, total, time.perf_counter() - started, what="pilot"))
+
+        even = self.choices.but(target_error=None)  # its trials give every pixel as many samples
+        return pilot(
+            device,
+            self.scene,
+            even,
+            seed=self.seed,
+            spp=self.count,
+            time_limit=self.time_limit,
+            tell=tell,
+        )
+
+
+@dataclass(eq=False)
+class Opened:
+    """An order on its device; `found`: what a pilot chose."""
+
+    order: Order
+    session: Session
+    found: Found | None
+
+    def steps(self, callback: ProgressCallback | None, urgency: Callable[[], int]) -> Iterator[int]:
+        """Render, and stop wherever the picture has more samples: at how many of each pixel, on the mean."""
+        order, session, target = self.order, self.session, self.order.choices.target_error
+        if target is not None:
+            render = TargetRender(session, target, order.spp)
+            yield from render.steps(order.time_limit, callback, urgency)
+            return
+        total = order.count if order.count < MAX_SAMPLES else None
+        for done in session.passes(order.first, order.count, order.time_limit, urgency):
+            if callback is not None:
+                with Glance(
+                    partial(make_result, session, order.first, done, final=False), callback
+                ) as glance:
+                    callback(Progress(done, total, session.seconds, order.time_limit, glance=glance))
+            yield done
+
+    def result(self, done: int, final: bool = True) -> Result:
+        """The picture at so many samples."""
+        order = self.order
+        result = make_result(self.session, order.first, done, final)
+        if order.choices.target_error is not None:
+            result.metadata["target_error"] = order.choices.target_error
+        if self.found is not None:
+            from clvol.lab.repeat import repeat_command
+
+            repeat = repeat_command(order.scene, self.found.options, self._other_options(done))
+            result.metadata |= {
+                "pilot": self.found.options,
+                "pilot_reason": self.found.reason,
+                "repeat": repeat,
+            }
+            if final:
+                log.info("repeat with: %s", repeat)
+        return result
+
+    def _other_options(self, done: int) -> dict[str, Any]:
+        """What was asked for beside what the pilot chose, as options of the command line."""
+        order, choices = self.order, self.order.choices
+        assert self.found is not None
+        given: dict[str, Any] = {
+            f: n for f, n in choices.names.items() if n != "auto" and f not in self.found.names
+        }
+        if choices.majorant_scale != 1:
+            given["majorant_scale"] = choices.majorant_scale
+        given |= {name: getattr(choices, name) for name in ("step", "target_error", "aov")}
+        if choices.target_error is not None:
+            given |= {"spp": order.spp, "time": order.time_limit}
+        elif order.first:  # a time limit is repeated by the samples it was enough for
+            given["samples"] = f"{order.first},{done}"
+        else:
+            given["spp"] = done
+        size = None if order.size is None else "x".join(map(str, order.size))
+        return given | {"sensor": order.sensor, "size": size, "seed": order.seed, "device": order.device}
+
+
+def check_scene(function: str, scene: object) -> Scene:
+    """`scene` if it is one; OptionError, which names the function, otherwise."""
+    if not isinstance(scene, Scene):
+        raise OptionError(
+            f"{function} takes a Scene, not {type(scene).__name__}",
+            hint="make one with load_file or load_dict",
+        )
+    return scene
+
+
+def _sample_range(
+    scene: Scene, spp: int | None, time_limit: float | None, samples: tuple[int, int] | None
+) -> tuple[int, int]:
+    """First sample and how many; a time limit alone sets no end."""
+    if samples is not None and spp is not None:
+        raise OptionError("spp and samples exclude each other", hint="samples=(first, count) says both")
+    if time_limit is not None and time_limit != math.inf:
+        positive("time limit ", time_limit, " of seconds")
+    if samples is not None:
+        if not isinstance(samples, tuple | list) or len(samples) != 2:
+            raise OptionError(f"samples={shown(samples)} is not a pair", hint="give (first, count)")
+        first, count = samples
+    elif time_limit is not None and spp is None:
+        first, count = 0, MAX_SAMPLES
+    else:
+        first, count = 0, scene.spp if spp is None else spp
+    try:
+        first, count = operator.index(first), operator.index(count)
+    except TypeError:
+        given = f"not {shown(first)} and {shown(count)}"
+        raise OptionError("numbers of samples must be whole", hint=given) from None
+    if first < 0 or count < 1 or first + count > MAX_SAMPLES:
+        raise OptionError(
+            f"cannot render {count} samples per pixel from sample {first} on",
+            hint=f"give at least 1 sample, and at most {MAX_SAMPLES} in all",
+        )
+    return first, count

@@ -1,0 +1,172 @@
+"""`clvol.render`: from a scene and the user's choices to a Result; `clvol.plan`: to what it would do."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from typing import TYPE_CHECKING, Any
+
+from clvol.api.order import Order, check_scene
+from clvol.base.interrupts import interruptible
+from clvol.base.notebook import progress_bar
+from clvol.errors import OptionError
+from clvol.picture.profile import RENDER
+from clvol.planning import registry
+from clvol.planning.choices import NUMBERS, Choices
+from clvol.planning.plan import Plan
+from clvol.rendering.profiler import Profiler, timed
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from clvol.base.progress import ProgressCallback
+    from clvol.picture.result import Result
+    from clvol.scene.records import Scene
+
+
+def render(
+    scene: Scene,
+    *,
+    spp: int | None = None,
+    seed: int | None = None,
+    sensor: int | None = None,
+    size: tuple[int, int] | None = None,
+    technique: str = "auto",
+    transmittance: str = "auto",
+    majorant: str = "auto",
+    lookup: str = "auto",
+    absorption: str = "auto",
+    gathering: str = "auto",
+    roulette: str = "auto",
+    background: str = "auto",
+    probability: str = "auto",
+    control: str = "auto",
+    sampler: str = "auto",
+    shadow_cache: str = "auto",
+    light_choice: str = "auto",
+    next_event: str = "auto",
+    lanes: str = "auto",
+    majorant_scale: float = 1.0,
+    step: float | None = None,
+    aov: Sequence[str] = (),
+    time_limit: float | None = None,
+    target_error: float | None = None,
+    device: str | None = None,
+    progress: bool | ProgressCallback = False,
+    samples: tuple[int, int] | None = None,
+    pool: int | None = None,
+    profile: bool = False,
+) -> Result:
+    """Render a scene.
+
+    Parameters
+    ----------
+    scene
+        From `load_file` or `load_dict`.
+    spp, seed
+        Samples per pixel and 64-bit seed. They default to the scene's.
+    sensor
+        Which of the scene's sensors sees it, from 0. The default is the first.
+    size
+        Pixels (width, height) instead of those of the scene's film. The field of view stays along the axis
+        that it is given for.
+    technique, transmittance, majorant, lookup, absorption, roulette, gathering, background, probability,
+    control
+        Names from `clvol.planning.registry`. "auto" takes the scene's own choice, else follows fixed rules,
+        so that the same seed gives the same bits. Technique "auto:pilot" has a short measured pilot choose
+        technique, transmittance and majorant, where they are left at "auto". ``result.metadata["repeat"]``
+        says what it chose.
+    sampler, shadow_cache, light_choice, next_event, lanes
+        Names from there too.
+    majorant_scale
+        Multiplies every bound of the density, for experiments. A factor below 1 is only for techniques and
+        transmittances that stay unbiased there.
+    step
+        World length of a step of ray marching. The default is the edge of a voxel.
+    aov
+        Names from `clvol.planning.registry.AOVS` to add to ``result.aovs``. They are means per sample
+        ("largest_weight": maxima).
+    time_limit
+        Seconds after which no new pass of samples is begun. Alone it replaces `spp`. Passes begun are
+        finished, unless paths go on for more than 10 seconds (30 where no pass is finished yet).
+    target_error
+        Mean relative standard error (`Result.noise`) at which the render ends. A survey that is not in the
+        picture judges it, and pixels get samples by their noise. `spp` then is the most on the mean.
+    device
+        Index or part of the name of an OpenCL device (see `clvol devices`).
+    progress
+        True for a progress bar, in a terminal or a notebook; or a callable that receives
+        `clvol.base.progress.Progress` records: how far the render is, its ``image`` so far, its ``noise``.
+    samples
+        (first, count): render only these of the samples. Results of disjoint ranges `merge`.
+    pool
+        Paths in flight, for measurements. The picture does not depend on it.
+    profile
+        Find out where the time goes: ``result.profile``.
+
+    Returns
+    -------
+    Result
+        The picture and what is known of it. Ctrl-C finishes the paths in flight and returns the picture so
+        far, with ``stats["interrupted"]`` set. A second Ctrl-C does not wait for them and keeps the samples
+        that every pixel has. A third raises KeyboardInterrupt.
+
+    Raises
+    ------
+    OptionError, SceneError, VolumeError, DeviceError
+        A choice, sensor, size, scene, volume or device that won't do.
+    RenderError
+        The render was to end, and no pass of samples ever did.
+    """
+    given = dict(locals())
+    order = Order.of("render", scene, given)
+    bar = progress_bar() if progress is True else nullcontext(progress or None)
+    profiler = Profiler() if profile else None
+    with bar as callback:
+        opened = order.open(callback, profiler)
+        with interruptible() as interrupt:
+            interrupt.heed(patience=2)
+            done = 0
+            with timed(profiler, RENDER):
+                for done in opened.steps(callback, interrupt.urgency):  # noqa: B007
+                    pass
+                interrupt.keep()
+            with timed(profiler, "picture"):
+                result = opened.result(done)
+            result.stats["interrupted"] = interrupt.asked()
+    result.profile = profiler.profile(result) if profiler else None
+    return result
+
+
+def plan(scene: Scene, **choices: Any) -> Plan:
+    """Say what `render` would do for a scene, without a device and before anything is built.
+
+    Parameters
+    ----------
+    scene : from `load_file` or `load_dict`.
+    choices : technique, transmittance, majorant, lookup, absorption, roulette, gathering, background,
+        probability, control, sampler, shadow_cache, light_choice, next_event, lanes, majorant_scale, step,
+        target_error, aov, as for `render`.
+
+    Returns
+    -------
+    Plan.  Printed it says the choices with their reasons, what the scene was found to use, and what is
+    compiled.  A majorant left at auto is weighed when the volumes are prepared.
+
+    Raises
+    ------
+    OptionError : a choice that won't do.  What depends on the volumes, as a step that is too fine, `render`
+        refuses.  "auto:pilot" is refused: what a pilot chooses is not known before it has rendered.
+    TypeError : a keyword that is no choice.
+    """
+    scene = check_scene("plan", scene)
+    for name in choices:
+        if name not in registry.FAMILIES and name not in NUMBERS:
+            known = ", ".join((*registry.FAMILIES, *NUMBERS))
+            raise TypeError(f"plan() takes the choices of a render ({known}), not {name!r}")
+    if choices.get("technique") == registry.PILOT:
+        hint = "plan the technique that it chose: the metadata of its render say which"
+        raise OptionError("what a pilot chooses is not known before it has rendered", hint=hint)
+    names = {family: choices.pop(family, "auto") for family in registry.FAMILIES}
+    for family, name in names.items():
+        registry.check_choice(family, name)
+    return Plan.of(scene, Choices.for_scene(scene, names, **choices))
