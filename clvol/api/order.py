@@ -151,9 +151,8 @@ class Opened:
         total = order.count if order.count < MAX_SAMPLES else None
         for done in session.passes(order.first, order.count, order.time_limit, urgency):
             if callback is not None:
-                with Glance(
-                    partial(make_result, session, order.first, done, final=False), callback
-                ) as glance:
+                look = partial(make_result, session, order.first, done, final=False)
+                with Glance(look, callback) as glance:
                     callback(Progress(done, total, session.seconds, order.time_limit, glance=glance))
             yield done
 
