@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from clvol.planning.plan import Plan
     from clvol.scene import load_dict, load_file, look_at, rotate, scale, translate
     from clvol.scene.records import Scene
+    from clvol.staging.stage import volume_scene
 
 __all__ = [
     "Comparison",
@@ -62,6 +63,7 @@ __all__ = [
     "selftest",
     "trace_ray",
     "translate",
+    "volume_scene",
 ]
 
 _MODULES = {
@@ -78,6 +80,7 @@ _MODULES = {
     "clvol.planning.plan": ["Plan"],
     "clvol.scene": ["load_dict", "load_file", "look_at", "rotate", "scale", "translate"],
     "clvol.scene.records": ["Scene"],
+    "clvol.staging.stage": ["volume_scene"],
 }
 """The imports above, for those that run clvol rather than read it."""
 _EXPORTS = {name: module for module, names in _MODULES.items() for name in names}

@@ -13,11 +13,14 @@ from clvol.cli.info import info
 from clvol.cli.messages import OneLineErrors
 from clvol.cli.ray import ray
 from clvol.cli.render import render
+from clvol.cli.scene import scene
 from clvol.cli.selftest import selftest
 
 EXAMPLES = """
 \b
 Examples:
+  clvol render scenes/fire.vdb -o fire.png
+  clvol scene scenes/fire.vdb -o fire.xml
   clvol render scenes/fire.xml -o fire.exr
   clvol compare scenes/smoke.xml --techniques delta,spectral -o report/
   clvol selftest scenes/smoke.xml --quick
@@ -42,7 +45,7 @@ def main(ctx: click.Context) -> None:
         click.echo(ctx.get_help())
 
 
-for command in (render, info, devices, selftest, ray, compare):
+for command in (render, scene, info, devices, selftest, ray, compare):
     main.add_command(command)
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""`clvol render`: a scene into pictures."""
+"""`clvol render`: a scene or a volume into pictures."""
 
 from __future__ import annotations
 
@@ -23,6 +23,8 @@ from clvol.cli.options import (
     step_option,
 )
 from clvol.cli.pictures import Shown, picture_options, write_views
+from clvol.cli.quality import Quality, extent_of, write_qualities
+from clvol.cli.volumes import Asked, Background, volume_options, write_looks
 from clvol.errors import Error
 
 if TYPE_CHECKING:
@@ -31,10 +33,13 @@ if TYPE_CHECKING:
     from clvol.base.output_files import StrPath
     from clvol.picture.profile import Profile
     from clvol.picture.result import Result
+    from clvol.scene.records import Scene
 
 EXAMPLES = """
 \b
 Examples:
+  clvol render scenes/fire.vdb -o fire.png
+  clvol render smoke.vdb -o smoke.png --light studio --view front --quality draft
   clvol render scenes/fire.xml -o fire.exr
   clvol render scenes/cloud.xml -o cloud.exr -o cloud.png --spp 256
   clvol render scenes/cloud.xml -o cloud.exr --time 20 -v
@@ -49,7 +54,7 @@ Examples:
 
 
 class RenderCommand(ExplainedCommand):
-    """As `ExplainedCommand`, and what the pictures that --aov adds show, and which views there are."""
+    """As `ExplainedCommand`, and what AOVs, lights, qualities and views there are."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write a section of each before the rest."""
@@ -57,6 +62,8 @@ class RenderCommand(ExplainedCommand):
 
         with formatter.section("--aov"):
             formatter.write_dl(list(AOVS.items()))
+        write_looks(formatter)
+        write_qualities(formatter)
         write_views(formatter)
         super().format_epilog(ctx, formatter)
 
@@ -73,7 +80,14 @@ class RenderCommand(ExplainedCommand):
     help="Picture to write: .exr has everything; .png, .jpg, .tif, .hdr and others the picture. "
     "May be given several times.",
 )
-@family_options(pilot=True)
+@volume_options
+@click.option(
+    "--background",
+    type=Background(),
+    default="auto",
+    help="Colour behind all, which lights nothing, or transparent; or how light from there is weighed.",
+)
+@family_options("background", pilot=True)
 @majorant_scale_option
 @step_option
 @click.option(
@@ -93,6 +107,7 @@ class RenderCommand(ExplainedCommand):
     metavar="FIRST,COUNT",
     help="Only COUNT samples of each pixel, from number FIRST on, instead of the first --spp.",
 )
+@click.option("--quality", type=Quality(), help="How much noise is left; good for volumes by default.")
 @positive_option(
     "--time",
     "time_limit",
@@ -125,45 +140,42 @@ class RenderCommand(ExplainedCommand):
 def render(
     scene: str,
     outputs: tuple[str, ...],
-    spp: int | None,
-    time_limit: float | None,
     definitions: tuple[tuple[str, str], ...],
     verbose: bool,
-    profile: bool,
     trace: str | None,
     quiet: bool,
     **options: Any,
 ) -> None:
-    """Render SCENE, a Mitsuba 3 XML file, into one or more pictures.
+    """Render SCENE, a Mitsuba 3 XML file or a volume, into one or more pictures.
 
-    Ctrl-C ends the render early and keeps the picture so far; so do SIGTERM and SIGHUP.
+    A volume (.vdb, .vol, .npy, .npz, and what the extra `science` reads) is framed, scaled so that it reads
+    well, and lit; what was chosen is printed. Ctrl-C ends the render early and keeps the picture so far, and
+    so do SIGTERM and SIGHUP.
     """
     from clvol.base.progress import RichProgress, error_console
     from clvol.cli.profile import profile_lines
-    from clvol.picture.formats import check_holds
-    from clvol.picture.saving import check_disk, save_all
-    from clvol.scene.views import viewed
+    from clvol.picture.saving import save_all
 
-    if spp is not None and time_limit is not None:
-        raise click.UsageError("give --spp or --time, not both")
     shown = Shown.taken(options)
+    asked = Asked.taken(scene, options, definitions)
+    extent = extent_of(options, asked.is_volume)
     _check_files(scene, outputs, trace, shown, bool(options["aov"]))
     console = error_console()
     with logging_to(console, verbose):
         import clvol
 
-        loaded = clvol.load_file(scene, **dict(definitions))
-        film = viewed(loaded, options["sensor"], options["size"]).film
-        for output in outputs:
-            check_holds(output, alpha=film.has_alpha, size=film.window[2:])
-            check_disk(output, math.prod(film.window[2:]), len(options["aov"]))
+        loaded, lines = asked.open(options["size"])
+        if lines and not quiet:
+            mention(lines)
+        _check_room(loaded, outputs, options)
         piloted = options["technique"] == "auto:pilot"
         if piloted and not quiet and not console.is_terminal:
             from clvol.lab.repeat import announcement
 
             mention([announcement(loaded, options)], err=True)
         with nullcontext(False) if quiet else RichProgress(console) as progress:
-            options |= {"spp": spp, "time_limit": time_limit, "profile": profile or trace is not None}
+            profile = options.pop("profile")
+            options |= extent | {"profile": profile or trace is not None}
             result = clvol.render(loaded, progress=progress, **options)
         if piloted:
             from clvol.lab.repeat import with_definitions
@@ -183,6 +195,18 @@ def render(
     for failure in failures.values():
         raise failure
     exit_by(result.stats["interrupted"])
+
+
+def _check_room(loaded: Scene, outputs: Sequence[str], options: dict[str, Any]) -> None:
+    """Refuse files that could not hold the picture."""
+    from clvol.picture.formats import check_holds
+    from clvol.picture.saving import check_disk
+    from clvol.scene.views import viewed
+
+    film = viewed(loaded, options["sensor"], options["size"]).film
+    for output in outputs:
+        check_holds(output, alpha=film.has_alpha, size=film.window[2:])
+        check_disk(output, math.prod(film.window[2:]), len(options["aov"]))
 
 
 def _check_files(scene: str, outputs: Sequence[str], trace: str | None, shown: Shown, aovs: bool) -> None:

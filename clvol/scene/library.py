@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
     from clvol.volumes.grid import Grid
 
+Grids = dict[tuple["Path", str | None], "Grid"]
+"""Volumes by file and grid: each is read once."""
 PluginTable = Mapping[str, Mapping[str, Callable[[Any], object]]]
 """By kind and name of the plugin; each function turns a `clvol.scene.reader.Reader` into a record."""
 
@@ -27,6 +29,8 @@ class Library:
         The scene, searched for ids.
     plugins : PluginTable
         What is supported.
+    grids : dict, optional
+        Volumes that were read before, by file and grid; those read from now on join them.
 
     Raises
     ------
@@ -34,9 +38,9 @@ class Library:
         Two nodes with the same id.
     """
 
-    def __init__(self, root: Node, plugins: PluginTable) -> None:
+    def __init__(self, root: Node, plugins: PluginTable, grids: Grids | None = None) -> None:
         self.plugins = plugins
-        self.grids: dict[tuple[Path, str | None], Grid] = {}
+        self.grids: Grids = {} if grids is None else grids
         self.reduced: dict[int, Any] = {}  # by id() of a grid or volume that `grids` or a record keeps alive
         self.taken: set[int] = set()  # id() of every plugin that another one holds or refers to
         self.built: dict[int, Any] = {}  # records, by id() of their node

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from clvol.errors import SceneError, shown
 from clvol.scene import bsdf, emitter, integrator, medium, phase, sensor, shape, texture, volume
-from clvol.scene.library import Library, PluginTable
+from clvol.scene.library import Grids, Library, PluginTable
 from clvol.scene.mesh_files import FORMATS
 from clvol.scene.nodes import Node, from_dict
 from clvol.scene.reader import build
@@ -138,10 +138,24 @@ def load_dict(scene: Mapping[str, object]) -> Scene:
     return _build(from_dict(scene), source="")
 
 
-def _build(root: Node, source: str) -> Scene:
+def load_plugin(plugin: Mapping[str, object], grids: Grids) -> Any:
+    """The record of one plugin, such as a volume, described by a dict as inside of a scene.
+
+    grids : volumes that were read before; those read now join them.
+    """
+    node = from_dict(plugin, "volume")
+    return build(node, Library(node, PLUGINS, grids))
+
+
+def load_staged(scene: Mapping[str, object], source: str, grids: Grids) -> Scene:
+    """As `load_dict`, of a scene made for what `source` names, with volumes that were read before."""
+    return _build(from_dict(scene), source, grids)
+
+
+def _build(root: Node, source: str, grids: Grids | None = None) -> Scene:
     if root.type != "scene":
         raise SceneError(f"expected a scene, got a '{root.type}'", root.where)
-    library = Library(root, PLUGINS)
+    library = Library(root, PLUGINS, grids)
     records: dict[str, list[tuple[Node, Any]]] = {kind: [] for kind in PLUGINS}
     seen: set[int] = set()
     for name, value in root.parameters():

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 from clvol.errors import OptionError, shown
 from clvol.scene.sensor import film_fault
 
+TRANSPARENT = "transparent"
+
 if TYPE_CHECKING:
     from clvol.scene.records import Scene
 
@@ -42,6 +44,26 @@ def in_size(scene: Scene, size: tuple[int, int]) -> Scene:
     Its field of view stays along the axis that it is given for.  Raises OptionError for impossible sizes, and
     for films with a crop window, whose pixels are of the old size.
     """
+    width, height = check_size(size)
+    if scene.film.crop is not None:
+        hint = "leave the size out, or the crop window in the scene"
+        raise OptionError("the film has a crop window, which goes with its own size", scene.source, hint)
+    return replace(scene, film=replace(scene.film, width=width, height=height))
+
+
+def before(scene: Scene, background: str | tuple[float, ...]) -> Scene:
+    """The scene before a background of its own, which lights nothing, instead of the lights behind it.
+
+    background : linear radiance, one number or three; or "transparent", of a picture with alpha.
+    """
+    integrator = replace(scene.integrator, hide_emitters=True)
+    if background == TRANSPARENT:
+        return replace(scene, film=replace(scene.film, pixel_format="rgba"), integrator=integrator)
+    return replace(scene, integrator=integrator)
+
+
+def check_size(size: tuple[int, int]) -> tuple[int, int]:
+    """Width and height of a film; OptionError where there can be none of that size."""
     try:
         width, height = map(operator.index, size)
     except (TypeError, ValueError):
@@ -50,7 +72,4 @@ def in_size(scene: Scene, size: tuple[int, int]) -> Scene:
         ) from None
     if fault := film_fault(width, height):
         raise OptionError(fault)
-    if scene.film.crop is not None:
-        hint = "leave the size out, or the crop window in the scene"
-        raise OptionError("the film has a crop window, which goes with its own size", scene.source, hint)
-    return replace(scene, film=replace(scene.film, width=width, height=height))
+    return width, height

@@ -30,6 +30,11 @@ class DenseGrid:
     index_to_world: np.ndarray | None = None
     unit: str = ""
 
+    @property
+    def channels(self) -> int:
+        """Values of a sample: 1 or 3."""
+        return int(self.values.shape[-1])
+
     def __repr__(self) -> str:
         depth, height, width, channels = self.values.shape
         return f"<DenseGrid {self.name or self.source}: {width} x {height} x {depth}, {channels} channels>"
@@ -64,6 +69,11 @@ class SparseGrid:
 
     def __repr__(self) -> str:
         return f"<SparseGrid {self.name}: {len(self.leaf_origins)} leaves, {len(self.tile_origins)} tiles>"
+
+    @property
+    def channels(self) -> int:
+        """Values of a sample: 1 or 3."""
+        return 1
 
     @property
     def active_voxels(self) -> int:

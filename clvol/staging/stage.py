@@ -1,0 +1,244 @@
+"""`clvol.volume_scene`: a scene round a volume, and what was chosen for it in a line each."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from clvol.scene.loader import load_staged
+from clvol.scene.records import GridVolume
+from clvol.scene.transforms import scale, translate
+from clvol.staging.framing import FOV, Axes, View, frame
+from clvol.staging.lights import environment_file, look_emitters
+from clvol.staging.medium import Grids, Scales, choose_scales, medium
+from clvol.staging.options import OPTIONS, VIEWS, checked
+from clvol.staging.said import said
+from clvol.staging.source import Field, Source
+from clvol.staging.thickness import Rays
+from clvol.staging.up import guess_up
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from types import SimpleNamespace
+
+    from clvol.scene.records import Scene
+
+log = logging.getLogger("clvol")
+SIZE = (512, 512)
+"""Of the picture, in pixels."""
+SPP = 256
+"""Samples per pixel where nothing else ends the render."""
+MAX_DEPTH, RR_DEPTH = 128, 16
+DIMMED = 0.4
+"""What all light is multiplied by where the volume glows by itself."""
+FLOOR, FLOOR_SIZE = 0.3, 40.0
+"""Reflectance of the floor, and its radius in diagonals of the box."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fixed:
+    """What all frames of a sequence share: the points (n, 3) that are framed, what is up, and the scales."""
+
+    points: np.ndarray
+    up: tuple[str, str]
+    scales: Scales
+
+
+@dataclass(frozen=True, eq=False)
+class Staged:
+    """A scene description, what was chosen for it in a line each, and what was read for it."""
+
+    description: dict[str, Any]
+    lines: tuple[str, ...]
+    fixed: Fixed
+    source: Source
+
+    def load(self) -> Scene:
+        """The scene, ready to be rendered."""
+        name = "" if self.source.path is None else self.source.name
+        return load_staged(self.description, name, self.source.grids)
+
+
+def stage(
+    source: Source,
+    given: Mapping[str, Any],
+    size: tuple[int, int] = SIZE,
+    spp: int = SPP,
+    fixed: Fixed | None = None,
+) -> Staged:
+    """Describe the scene of a volume.
+
+    Parameters
+    ----------
+    given : options of `clvol.staging.options`; None for those that are not.
+    size, spp : pixels (width, height) of the picture, and samples for each.
+    fixed : what other frames of the sequence have, else chosen for this volume.
+    """
+    options = checked(given)
+    grids = Grids.of(source, options)
+    options.light = options.light or ("rim" if grids.burns else "sun")
+    up = fixed.up if fixed else (options.up, "") if options.up else guess_up(source.path)
+    points = fixed.points if fixed else shown_points(grids)
+    box = np.stack([points.min(axis=0), points.max(axis=0)])
+    axes, (azimuth, elevation) = Axes.of(up[0]), angles(options)
+    view = frame(points, axes, azimuth, elevation, size, options.distance)
+    rays = Rays.through(box, view, size)
+    scales = fixed.scales if fixed else choose_scales(grids, options, rays)
+    hidden = {} if options.background is None else {"hide_emitters": True}
+    description: dict[str, Any] = {
+        "type": "scene",
+        "integrator": {"type": "volpath", "max_depth": MAX_DEPTH, "rr_depth": RR_DEPTH, **hidden},
+        "sensor": sensor(view, box, size, spp),
+        **lights(options, axes, azimuth, DIMMED if grids.burns else 1.0),
+        **({"floor": floor(box, axes)} if options.ground else {}),
+    }
+    if not grids.density.empty:
+        description["volume"] = bounds(grids.density) | {"interior": medium(grids, options, scales)}
+    fixed = Fixed(points, up, scales)
+    return Staged(description, tuple(said(source, grids, options, view, rays, fixed)), fixed, source)
+
+
+def angles(options: SimpleNamespace) -> tuple[float, float]:
+    """Azimuth and elevation of the camera; what is left of a pair of angles is that of the usual view."""
+    azimuth, elevation = VIEWS[options.view]
+    return (
+        azimuth if options.azimuth is None else options.azimuth,
+        elevation if options.elevation is None else options.elevation,
+    )
+
+
+def shown_points(grids: Grids) -> np.ndarray:
+    """The outermost points (n, 3) in the world of what is seen; the unit cube's where that is nothing."""
+    if grids.density.empty:
+        return np.array(list(product((0.0, 1.0), repeat=3)))
+    return grids.density.outermost()
+
+
+def sensor(view: View, box: np.ndarray, size: tuple[int, int], spp: int) -> dict[str, Any]:
+    """The camera's plugin with its film."""
+    reach = view.distance + float(np.linalg.norm(box[1] - box[0]))
+    return {
+        "type": "perspective",
+        "fov": FOV,
+        "fov_axis": "larger",
+        "near_clip": 1e-3 * reach,
+        "far_clip": 1e3 * reach,
+        "to_world": view.to_world,
+        "film": {"type": "hdrfilm", "width": size[0], "height": size[1], "rfilter": {"type": "box"}},
+        "sampler": {"type": "independent", "sample_count": spp},
+    }
+
+
+def lights(options: SimpleNamespace, axes: Axes, azimuth: float, dimmed: float) -> dict[str, Any]:
+    """Those of the look, or of the file."""
+    sun = None if options.sun_direction is None else np.array(options.sun_direction)
+    if options.light.lower().endswith((".exr", ".hdr")):
+        return {"environment": environment_file(options.light, axes, azimuth)}
+    return look_emitters(options.light, axes, azimuth, sun, dimmed)
+
+
+def floor(box: np.ndarray, axes: Axes) -> dict[str, Any]:
+    """A disk right below the box."""
+    diagonal = float(np.linalg.norm(box[1] - box[0]))
+    centre = box.mean(axis=0)
+    below = centre - axes.up * ((box[1] - box[0]) @ axes.up / 2 + 1e-3 * diagonal)
+    turn = np.eye(4)  # the disk's normal is its local z
+    turn[:3, :3] = np.stack([axes.right, -axes.front, axes.up], axis=1)
+    return {
+        "type": "disk",
+        "to_world": translate(below) @ turn @ scale(FLOOR_SIZE * diagonal),
+        "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": FLOOR}},
+    }
+
+
+def bounds(density: Field) -> dict[str, Any]:
+    """A cube without a surface round all of the density."""
+    volume = density.volume
+    assert isinstance(volume, GridVolume)
+    lower, upper = volume.lower, volume.upper
+    to_world = volume.index_to_world @ translate((lower + upper) / 2) @ scale((upper - lower) / 2)
+    return {"type": "cube", "to_world": to_world, "bsdf": {"type": "null"}}
+
+
+def volume_scene(
+    volume: Any,
+    *,
+    density: str | None = None,
+    temperature: str | None = None,
+    flame: str | None = None,
+    colour: str | None = None,
+    density_scale: float | None = None,
+    albedo: float | Sequence[float] | None = None,
+    anisotropy: float | None = None,
+    temperature_scale: float | None = None,
+    emission_scale: float | None = None,
+    light: str | None = None,
+    sun_direction: Sequence[float] | None = None,
+    view: str | None = None,
+    azimuth: float | None = None,
+    elevation: float | None = None,
+    distance: float | None = None,
+    up: str | None = None,
+    ground: bool | None = None,
+    background: str | float | Sequence[float] | None = None,
+    size: tuple[int, int] = SIZE,
+    spp: int = SPP,
+) -> Scene:
+    """Make a scene of a volume alone: framed, scaled so that it reads well, and lit.
+
+    It is what `clvol render VOLUME` renders and `clvol scene VOLUME` writes. What was chosen is logged to the
+    logger "clvol", as information.
+
+    Parameters
+    ----------
+    volume
+        A file's name, an array [z, y, x], or a dict of arrays by name, as
+        ``{"density": a, "temperature": b}``.
+    density, temperature, flame, colour
+        Names of grids, which are found by their usual names otherwise. "none" leaves one out.
+    density_scale
+        Extinction of density 1. By default the optical thickness is about 8 at the 90th percentile of the
+        rays that the camera sends through the volume.
+    albedo
+        Share of light that is scattered, or three of them: 0.95, and 0.5 of what burns.
+    anisotropy
+        Mean cosine of scattering, 0.3 by default.
+    temperature_scale, emission_scale
+        Kelvin of temperature 1, and how bright it glows (0: not at all).
+    light
+        "sun", "sky", "studio", "rim", or the file of an environment. The default is "sun", and "rim" for what
+        burns.
+    sun_direction
+        Where the sun, or the main lamp, stands, seen from the volume; by default it goes with the camera.
+    view, azimuth, elevation, distance
+        A view by name ("front", "back", "left", "right", "top", "three-quarter"), or by degrees round the
+        volume from its front and above the horizon. The distance is a factor: 1 fits the picture.
+    up
+        "y" or "z". It is guessed by who wrote the file.
+    ground
+        Put it on a floor that takes its shadow.
+    background
+        Colour behind it, which does not light it: a name, "#rrggbb", or numbers of linear radiance; or
+        "transparent".
+    size, spp
+        Pixels (width, height) of the picture, and samples for each.
+
+    Returns
+    -------
+    Scene
+        What `clvol.render` takes.
+
+    Raises
+    ------
+    OptionError, VolumeError, SceneError
+        An option, file, array or grid that won't do.
+    """
+    given = dict(locals())
+    staged = stage(Source.of(volume), {name: given[name] for name in OPTIONS}, size, spp)
+    for line in staged.lines:
+        log.info("%s", line)
+    return staged.load()
