@@ -168,7 +168,7 @@ def sparse_bounds(bricks: BrickTree, means: bool) -> SparseBounds:
             part[rows] = values
 
     def constant(places: np.ndarray) -> np.ndarray:
-        return bricks.standing.constant(places)[..., None]
+        return bricks.standing.constant(places)
 
     inside = _masked(inside, _sides(blocks, shape))
     return SparseBounds(blocks, inside, shape[::-1], BOUND_CELLS, constant)
@@ -200,7 +200,7 @@ def _slack_inside(bricks: BrickTree, halves: Cells, blocks: np.ndarray, size: in
     around = np.stack(np.meshgrid(*[np.arange(-1, per_block + 1)] * 3, indexing="ij"), axis=-1)
     places = np.clip(per_block * blocks[:, None, None, None] + around, 0, np.array(bricks.shape) - 1)
     row = bricks.find(places)
-    constant = bricks.standing.constant(places)[..., None, None, None, None]
+    constant = bricks.standing.constant(places)[..., None, None, None, :]
 
     def spread(values: np.ndarray) -> np.ndarray:
         cells = np.broadcast_to(constant, (*row.shape, *values.shape[1:])).copy()

@@ -12,7 +12,7 @@ import numpy as np
 from clvol.base.memory import format_bytes
 from clvol.scene import records
 from clvol.scene.materials import Bsdf, Dielectric, Mask, Null, TwoSided
-from clvol.volumes import VdbGridInfo, list_vdb, read_vdb, read_volume
+from clvol.volumes import GridInfo, list_vdb, read_vdb, read_volume
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
 from clvol.volumes.listing import box_of
 
@@ -29,7 +29,7 @@ def describe_volume(path: str, grid: str | None = None) -> list[str]:
     return lines or [f"{path}: it has no grids"]
 
 
-def _vdb_lines(path: str, number: int, stored: VdbGridInfo) -> Iterator[str]:
+def _vdb_lines(path: str, number: int, stored: GridInfo) -> Iterator[str]:
     if stored.unreadable:
         yield f"{stored.name}: cannot be rendered, {stored.unreadable}"
     else:
@@ -57,14 +57,15 @@ def _dense_lines(grid: DenseGrid) -> Iterator[str]:
 
 def _sparse_lines(grid: SparseGrid) -> Iterator[str]:
     stored = (grid.leaf_origins, grid.leaf_values, grid.leaf_active, grid.tile_origins, grid.tile_values)
-    background = f", background {_number(grid.background)}"
+    background = f", background {_spectrum(tuple(grid.background))}"
     if grid.active_voxels == 0:
         yield f"{grid.name}: sparse, no active voxels{background}: there is nothing to render"
     else:
         lower, upper = grid.active_box
         size = upper - lower + 1
         share = grid.active_voxels / int(size.astype(np.int64).prod())
-        yield f"{grid.name}: sparse, {size[0]} x {size[1]} x {size[2]} samples in the active box"
+        channels = f", {grid.channels} channels" if grid.channels > 1 else ""
+        yield f"{grid.name}: sparse, {size[0]} x {size[1]} x {size[2]} samples in the active box{channels}"
         yield f"  box      {_box(grid.active_box)} (index)"
         yield f"           {_box(box_of(grid.active_box, grid.index_to_world))} (world)"
         yield (
@@ -118,16 +119,15 @@ def _value_lines(found: Statistics, more: str = "") -> Iterator[str]:
 
 
 def active_statistics(grid: SparseGrid) -> Statistics:
-    """Of the active samples; a tile counts with all of its own.
+    """Of the active samples, of all channels; a tile counts with all of its own.
 
     The mask's bit order is OpenVDB's, x slowest, while the values lie z slowest.
     """
     bits = np.unpackbits(grid.leaf_active, axis=1, bitorder="little").astype(bool)
     active = bits.reshape(-1, 8, 8, 8).transpose(0, 3, 2, 1)
-    tile_samples = grid.tile_sizes[grid.tile_active].astype(np.int64) ** 3
-    return Statistics.of(grid.leaf_values[active]) + Statistics.of(
-        grid.tile_values[grid.tile_active], tile_samples
-    )
+    tiles = grid.tile_values[grid.tile_active]
+    each = np.broadcast_to(grid.tile_sizes[grid.tile_active, None].astype(np.int64) ** 3, tiles.shape)
+    return Statistics.of(grid.leaf_values[active]) + Statistics.of(tiles, each)
 
 
 def describe_scene(scene: records.Scene) -> list[str]:

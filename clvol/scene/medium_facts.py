@@ -9,7 +9,6 @@ import numpy as np
 
 from clvol.scene import records
 from clvol.scene.boundaries import is_clipped
-from clvol.volumes.grid import DenseGrid
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -74,7 +73,7 @@ def channels_of(volume: records.Volume) -> int:
     """Channels of a volume: 1 or 3."""
     if isinstance(volume, records.ConstVolume):
         return len(volume.value)
-    return volume.grid.values.shape[-1] if isinstance(volume.grid, DenseGrid) else 1
+    return volume.grid.channels
 
 
 def is_grey(volume: records.Volume) -> bool:

@@ -127,7 +127,7 @@ def _sparse_volume(reader: Reader, grid: SparseGrid) -> Volume:
     """
     to_world = reader.transform() @ grid.index_to_world
     filter_type = reader.string("filter_type", "trilinear", FILTER_TYPES)
-    if grid.active_voxels == 0 and grid.background == 0:
+    if grid.active_voxels == 0 and grid.clear_outside:
         log.warning("%s: has no active voxels, and is 0 everywhere", place(grid.source, grid.name))
         return ConstVolume((0.0,), to_world)
     return GridVolume(
@@ -136,7 +136,7 @@ def _sparse_volume(reader: Reader, grid: SparseGrid) -> Volume:
         grid.active_box[0] - 1.0,
         grid.active_box[1] + 1.0,
         filter_type,
-        clipped=grid.background == 0,
+        clipped=grid.clear_outside,
         source=f"{grid.source}:{grid.name}" if grid.name not in grid.source else grid.source,
     )
 
@@ -147,7 +147,7 @@ def largest_value(volume: Volume) -> float:
         return max(volume.value)
     if isinstance(volume.grid, DenseGrid):
         return float(volume.grid.values.max())
-    parts = (volume.grid.leaf_values, volume.grid.tile_values, np.array([volume.grid.background]))
+    parts = (volume.grid.leaf_values, volume.grid.tile_values, volume.grid.background)
     return float(max(part.max() for part in parts if part.size))
 
 
@@ -155,8 +155,7 @@ def limited(volume: Volume, maximum: float) -> Volume:
     """The volume with no value above `maximum`."""
     if isinstance(volume, ConstVolume):
         return replace(volume, value=tuple(min(value, maximum) for value in volume.value))
-    names = ("values",) if isinstance(volume.grid, DenseGrid) else ("leaf_values", "tile_values")
+    sparse = ("leaf_values", "tile_values", "background")
+    names = ("values",) if isinstance(volume.grid, DenseGrid) else sparse
     limits = {name: np.minimum(getattr(volume.grid, name), np.float32(maximum)) for name in names}
-    if isinstance(volume.grid, SparseGrid):
-        limits["background"] = min(volume.grid.background, maximum)
     return replace(volume, grid=replace(volume.grid, **limits))

@@ -50,7 +50,7 @@ def _endless(medium: records.Medium) -> bool:
         return False
     if isinstance(medium.sigma_t, records.ConstVolume):
         return any(medium.sigma_t.value)
-    return isinstance(medium.sigma_t.grid, SparseGrid) and medium.sigma_t.grid.background > 0
+    return isinstance(medium.sigma_t.grid, SparseGrid) and not medium.sigma_t.grid.clear_outside
 
 
 def _check_far_light(scene: records.Scene, medium: records.Medium) -> None:

@@ -7,17 +7,18 @@ read; majorants and the device do not.
 from clvol.volumes.check import check_coefficients, check_finite
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
 from clvol.volumes.listing import Listed, list_grids
+from clvol.volumes.grid_info import GridInfo
 from clvol.volumes.numpy_files import dense_from_array, read_numpy
 from clvol.volumes.read import read_volume
-from clvol.volumes.vdb import VdbGridInfo, list_vdb, read_vdb
+from clvol.volumes.vdb import list_vdb, read_vdb
 from clvol.volumes.vol import read_vol, write_vol
 
 __all__ = [
     "DenseGrid",
     "Grid",
     "Listed",
+    "GridInfo",
     "SparseGrid",
-    "VdbGridInfo",
     "check_coefficients",
     "check_finite",
     "dense_from_array",

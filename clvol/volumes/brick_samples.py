@@ -62,31 +62,31 @@ def bricks_over(size: tuple[int, int, int]) -> tuple[int, int, int]:
 
 
 def gather_sparse(grid: SparseGrid, standing: SparsePlaces, places: np.ndarray) -> Iterator[np.ndarray]:
-    """Samples of bricks, a chunk at a time: (n, 9, 9, 9, 1), far faces from the neighbours.
+    """Samples of bricks, a chunk at a time: (n, 9, 9, 9, channels), far faces from the neighbours.
 
     places : int (n, 3), z y x.
     """
     for first in range(0, len(places), CHUNK_BRICKS):
         chunk = places[first : first + CHUNK_BRICKS]
-        samples = np.empty((len(chunk), BRICK_EDGE, BRICK_EDGE, BRICK_EDGE), np.float32)
+        samples = np.empty((len(chunk), BRICK_EDGE, BRICK_EDGE, BRICK_EDGE, grid.channels), np.float32)
         for corner in np.ndindex(2, 2, 2):
             source = tuple(slice(0, 1) if d else slice(0, 8) for d in corner)
             target = tuple(slice(8, 9) if d else slice(0, 8) for d in corner)
             at = chunk + np.array(corner)
             leaf = standing.leaf(at)
-            block = np.empty((len(chunk), *(s.stop for s in source)), np.float32)
+            block = np.empty((len(chunk), *(s.stop for s in source), grid.channels), np.float32)
             block[:] = standing.constant(at)[:, None, None, None]
             filled = leaf >= 0
             block[filled] = grid.leaf_values[leaf[filled]][:, *source]
             samples[:, *target] = block
-        yield samples[..., None]
+        yield samples
 
 
 def sparse_extrema(
     grid: SparseGrid, standing: SparsePlaces, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Extrema of the halves of bricks: two arrays (n, 2, 2, 2, 1)."""
-    low = np.empty((len(places), 2, 2, 2, 1), np.float32)
+    """Extrema of the halves of bricks: two arrays (n, 2, 2, 2, channels)."""
+    low = np.empty((len(places), 2, 2, 2, grid.channels), np.float32)
     high, first = np.empty_like(low), 0
     for samples in gather_sparse(grid, standing, places):
         for combine, target in ((np.minimum, low), (np.maximum, high)):

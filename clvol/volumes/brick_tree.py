@@ -30,6 +30,7 @@ from clvol.volumes.tree import (
     keys,
     levels_over,
     rows_of,
+    unique_rows,
 )
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ class BrickTree:
     numbers : int32 (n,), the number of the brick there.
     nodes : int32 (m, 512), the top grid (cl/geometry/lattice_tree.h).
     levels : nodes on the way from its root to a brick.
-    minimum, maximum : float32 (n, 2, 2, 2, 1), extrema of the halves of those bricks.
+    minimum, maximum : float32 (n, 2, 2, 2, channels), extrema of the halves of those bricks.
     brick_count, constants, size, origin, channels : as in a BrickMap.
     """
 
@@ -72,7 +73,7 @@ class BrickTree:
     maximum: np.ndarray
     size: tuple[int, int, int]
     origin: tuple[int, int, int]
-    channels: int = 1
+    channels: int
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -87,17 +88,23 @@ class BrickTree:
     @property
     def peak(self) -> np.ndarray:
         """The largest value of each channel, float32 (channels,)."""
-        return np.array([max(self.maximum.max(initial=0), self.constants.max(initial=0))], np.float32)
+        largest: np.ndarray = np.maximum(
+            self.maximum.max(axis=(0, 1, 2, 3), initial=0), self.constants.max(axis=0, initial=0)
+        )
+        return largest
 
     def find(self, places: np.ndarray) -> np.ndarray:
         """Row of each place, int (...), among those that are kept, or -1."""
         return rows_of(keys(self.places), keys(places))
 
     def stored(self) -> Iterator[tuple[int, np.ndarray]]:
-        """Every brick to store, a bounded chunk at a time: (first brick, float32 (n, 9, 9, 9, 1))."""
+        """Every brick to store, a bounded chunk at a time: (first brick, float32 (n, 9, 9, 9, channels))."""
         yield from self._varying()
-        for number, value in enumerate(self.constants, self.brick_count - len(self.constants)):
-            yield number, np.full((1, BRICK_EDGE, BRICK_EDGE, BRICK_EDGE, 1), value, np.float32)
+        for number, values in enumerate(self.constants, self.brick_count - len(self.constants)):
+            yield (
+                number,
+                np.broadcast_to(values, (1, BRICK_EDGE, BRICK_EDGE, BRICK_EDGE, self.channels)).copy(),
+            )
 
     def _varying(self) -> Iterator[tuple[int, np.ndarray]]:
         varies = self.numbers < self.brick_count - len(self.constants)
@@ -107,7 +114,7 @@ class BrickTree:
             first += len(samples)
 
     def means(self) -> np.ndarray:
-        """Means of the interpolant over the halves of the bricks that are kept: float32 (n, 2, 2, 2, 1)."""
+        """Means of the interpolant over the halves of the kept bricks: float32 (n, 2, 2, 2, channels)."""
         means = self.minimum.copy()
         rows = np.flatnonzero(self.numbers < self.brick_count - len(self.constants))
         for first, samples in self._varying():
@@ -128,9 +135,9 @@ def build_tree(grid: SparseGrid, standing: SparsePlaces, places: np.ndarray) -> 
     """
     size, origin = sparse_lattice(grid)
     low, high = sparse_extrema(grid, standing, places)
-    lowest, highest = low.min(axis=(1, 2, 3, 4)), high.max(axis=(1, 2, 3, 4))
-    varies = lowest != highest
-    kept = varies | (lowest != standing.constant(places))
+    lowest, highest = low.min(axis=(1, 2, 3)), high.max(axis=(1, 2, 3))
+    varies = (lowest != highest).any(axis=1)
+    kept = varies | (lowest != standing.constant(places)).any(axis=1)
     places, low, high, lowest, varies = (a[kept] for a in (places, low, high, lowest, varies))
     levels = levels_over(standing.shape)
     tiers = build_tiers(places, levels)
@@ -139,20 +146,19 @@ def build_tree(grid: SparseGrid, standing: SparsePlaces, places: np.ndarray) -> 
             f"its bricks need more than {_MOST_NODES} nodes of a tree", place(grid.source, grid.name), PRUNE
         )
     values = [_constants(standing, tier, BRICK_CELLS**number) for number, tier in enumerate(tiers)]
-    constants = np.unique(np.concatenate([lowest[~varies], *(v.reshape(-1) for v in values)]))
+    constants, (own, *rows) = _number_constants([lowest[~varies], *values])
     count = int(np.count_nonzero(varies))
     numbers = np.empty(len(places), np.int32)
     numbers[varies] = np.arange(count)
-    numbers[~varies] = count + np.searchsorted(constants, lowest[~varies])
+    numbers[~varies] = count + own
 
     def entries(number: int, tier: Tier) -> np.ndarray:
-        found = count + np.searchsorted(constants, values[number])
+        found = count + rows[number]
         if number == 0 and len(numbers):
             found = np.where(tier.below >= 0, numbers[tier.below], found)
         return found
 
     nodes = device_nodes(tiers, entries)
-    constants = constants[:, None].astype(np.float32)
     return BrickTree(
         grid,
         standing,
@@ -166,7 +172,17 @@ def build_tree(grid: SparseGrid, standing: SparsePlaces, places: np.ndarray) -> 
         high,
         size,
         origin,
+        grid.channels,
     )
+
+
+def _number_constants(values: list[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray]]:
+    """The different ones of values (..., channels), float32 (n, channels), and the row of each, int (...)."""
+    channels = values[0].shape[-1]
+    constants, row = unique_rows(np.concatenate([part.reshape(-1, channels) for part in values]))
+    ends = np.cumsum([part.size // channels for part in values])
+    parts = np.split(row, ends[:-1])
+    return constants, [own.reshape(part.shape[:-1]) for own, part in zip(parts, values, strict=True)]
 
 
 def check_extent(size: tuple[int, ...], where: str) -> None:
@@ -180,8 +196,11 @@ def check_extent(size: tuple[int, ...], where: str) -> None:
 
 
 def _constants(standing: SparsePlaces, tier: Tier, edge: int) -> np.ndarray:
-    """What stands at each entry of a tier where nothing is kept, float32 (n, 8, 8, 8); `edge`: its bricks."""
-    values = np.empty(tier.below.shape, np.float32)
+    """What stands at each entry of a tier where nothing is kept, float32 (n, 8, 8, 8, channels).
+
+    edge : of an entry, in bricks.
+    """
+    values = np.empty((*tier.below.shape, len(standing.background)), np.float32)
     for rows, at in entry_places(tier.nodes):
         values[rows] = standing.constant(at * edge)
     return values

@@ -206,12 +206,12 @@ def _gather_dense(grid: DenseGrid, wanted: np.ndarray) -> Iterator[np.ndarray]:
 def _extrema_sparse(
     grid: SparseGrid, standing: SparsePlaces, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Extrema of every half brick, those at `places` from their samples: two arrays (2bz, 2by, 2bx, 1)."""
+    """Extrema of every half brick, from their samples at `places`: two arrays (2bz, 2by, 2bx, channels)."""
     bz, by, bx = standing.shape
-    low = np.empty((2 * bz, 2 * by, 2 * bx, 1), np.float32)
+    low = np.empty((2 * bz, 2 * by, 2 * bx, grid.channels), np.float32)
     layer = np.stack(np.meshgrid([0], np.arange(by), np.arange(bx), indexing="ij"), axis=-1)
     for z in range(bz):
-        constant = standing.constant(layer + np.array([z, 0, 0]))[..., None]
+        constant = standing.constant(layer + np.array([z, 0, 0]))
         low[2 * z : 2 * z + 2] = np.repeat(np.repeat(constant, 2, 1), 2, 2)
     high = low.copy()
     for target, halves in zip((low, high), sparse_extrema(grid, standing, places), strict=True):

@@ -72,7 +72,7 @@ def _slabs(grid: Grid) -> Iterator[np.ndarray]:
     if isinstance(grid, DenseGrid):
         stores = [grid.values]
     else:
-        stores = [grid.leaf_values, grid.tile_values, np.array([grid.background], np.float32)]
+        stores = [grid.leaf_values, grid.tile_values, grid.background]
     for store in stores:
         flat = store.reshape(-1)
         for first in range(0, flat.size, SLAB):

@@ -10,6 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+FOG_VOLUME, LEVEL_SET, STAGGERED = "fog volume", "level set", "staggered"
+KINDS = (FOG_VOLUME, LEVEL_SET, STAGGERED)
+"""OpenVDB's grid classes: densities, signed distances to a surface, velocities at the faces of voxels."""
+
 
 @dataclass(frozen=True, eq=False)
 class DenseGrid:
@@ -42,16 +46,18 @@ class DenseGrid:
 
 @dataclass(frozen=True, eq=False)
 class SparseGrid:
-    """Samples of an OpenVDB tree: 8³ leaves and constant tiles over a background.
+    """Samples of an OpenVDB tree: 8³ leaves and constant tiles over a background, of 1 or 3 channels.
 
     leaf_origins : int32 (n, 3), x y z index of each leaf's first sample, multiples of 8.
-    leaf_values : float32 (n, 8, 8, 8), indexed [leaf, z, y, x]; inactive voxels hold their stored value.
+    leaf_values : float32 (n, 8, 8, 8, channels), indexed [leaf, z, y, x]; inactive voxels hold their stored
+        value.
     leaf_active : uint8 (n, 64), bit mask of active voxels, bit order as in OpenVDB (x slowest).
     tile_origins : int32 (m, 3); tile_sizes : int32 (m,), edge in samples, a multiple of 8.
-    tile_values : float32 (m,); tile_active : bool (m,).
-    background : value everywhere else.
+    tile_values : float32 (m, channels); tile_active : bool (m,).
+    background : float32 (channels,), the value everywhere else.
     index_to_world : float64 (4, 4) for column vectors: the grid's own transform.
     active_box : int32 (2, 3), inclusive lower and upper index of the active samples (tiles included).
+    kind : what the file says that the values are, one of KINDS, or "" where it does not say.
     """
 
     leaf_origins: np.ndarray
@@ -61,9 +67,10 @@ class SparseGrid:
     tile_sizes: np.ndarray
     tile_values: np.ndarray
     tile_active: np.ndarray
-    background: float
+    background: np.ndarray
     index_to_world: np.ndarray
     active_box: np.ndarray
+    kind: str = ""
     name: str = "density"
     source: str = ""
 
@@ -73,7 +80,12 @@ class SparseGrid:
     @property
     def channels(self) -> int:
         """Values of a sample: 1 or 3."""
-        return 1
+        return int(self.leaf_values.shape[-1])
+
+    @property
+    def clear_outside(self) -> bool:
+        """Whether there is nothing outside of the leaves and tiles: the background is 0."""
+        return not self.background.any()
 
     @property
     def active_voxels(self) -> int:

@@ -74,16 +74,17 @@ class SparsePlaces:
         return np.where(row >= 0, self._leaf_rows[row], -1)
 
     def constant(self, places: np.ndarray) -> np.ndarray:
-        """Value of the tile at each place, float32 (...), or the background; leaves are not looked at."""
-        values = np.full(places.shape[:-1], self.background, np.float32)
+        """Values of the tile at each place, or of the background, float32 (..., channels); leaves aside."""
+        values = np.empty((*places.shape[:-1], len(self.background)), np.float32)
+        values[...] = self.background
         if not self._tiles:
             return values
         for edge, _, tile_keys, tile_values in self._tiles:
             # a place and its tile have the same cell of the lattice of that edge
             cell = (places * BRICK_CELLS + self._origin) // edge - self._origin // edge
             row = rows_of(tile_keys, keys(cell))
-            values = np.where(row >= 0, np.append(tile_values, np.float32(0))[row], values)
-        return values.astype(np.float32)
+            values[row >= 0] = tile_values[row[row >= 0]]
+        return values
 
     def changing(self) -> np.ndarray:
         """Places of bricks whose samples, far faces included, meet a leaf or two constants: int (n, 3).
@@ -101,14 +102,15 @@ class SparsePlaces:
 
     def _changing_in_box(self, table: np.ndarray) -> np.ndarray:
         """The same as a bool for every place of a small box."""
-        constant = np.full(table.shape, self.background, np.float32)
+        constant = np.empty((*table.shape, len(self.background)), np.float32)
+        constant[...] = self.background
         if self._tiles:
             constant = self.constant(np.stack(list(np.indices(table.shape)), axis=-1))
         nz, ny, nx = self.shape
         changes, own = np.zeros(self.shape, bool), constant[:-1, :-1, :-1]
         for z, y, x in _CORNERS:
             cut = np.s_[z : z + nz, y : y + ny, x : x + nx]
-            changes |= (table[cut] >= 0) | (constant[cut] != own)
+            changes |= (table[cut] >= 0) | (constant[cut] != own).any(axis=-1)
         return changes
 
     def _joined(self, parts: list[np.ndarray]) -> np.ndarray:
@@ -130,7 +132,8 @@ class SparsePlaces:
     def _meets(self, places: np.ndarray) -> np.ndarray:
         around = places[:, None] + _CORNERS
         constant = self.constant(around)
-        met: np.ndarray = np.any((self.leaf(around) >= 0) | (constant != constant[:, :1]), axis=1)
+        differs = (constant != constant[:, :1]).any(axis=2)
+        met: np.ndarray = np.any((self.leaf(around) >= 0) | differs, axis=1)
         return met
 
     def _at_leaves(self) -> Iterator[np.ndarray]:

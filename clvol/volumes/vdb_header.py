@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.volumes.files import NANOVDB
+from clvol.volumes.grid import KINDS
 from clvol.volumes.vdb_stream import ACTIVE_MASK, BLOSC, ZIP, VdbStream
 
 if TYPE_CHECKING:
@@ -76,10 +77,12 @@ class GridHeader:
     """What a grid says before its tree; `index_to_world` is None for a map that is not affine.
 
     half : floats and doubles are stored as 16-bit floats.  OpenVDB goes by this, not by the type's suffix.
+    kind : one of clvol.volumes.grid.KINDS, or "".
     """
 
     compression: int
     half: bool
+    kind: str
     active_box: np.ndarray | None
     active_voxels: int | None
     transform: str
@@ -167,10 +170,12 @@ def read_grid_header(stream: VdbStream, descriptor: Descriptor) -> GridHeader:
     if len(lower) == len(upper) == 12:
         box = np.frombuffer(lower + upper, "<i4").reshape(2, 3)
     voxels = metadata.get("file_voxel_count", b"")
+    kind = metadata.get("class", b"").decode("ascii", errors="replace")
     transform = stream.string()
     return GridHeader(
         compression=compression,
         half=any(metadata.get("is_saved_as_half_float", b"")),
+        kind=kind if kind in KINDS else "",
         active_box=box,
         active_voxels=struct.unpack("<q", voxels)[0] if len(voxels) == 8 else None,
         transform=transform,

@@ -179,13 +179,13 @@ def sparse_grid():
     rng = np.random.default_rng(5)
     return SparseGrid(
         leaf_origins=np.array([[-8, 0, 0], [8, 8, 0]], np.int32),
-        leaf_values=rng.random((2, 8, 8, 8)).astype(np.float32),
+        leaf_values=rng.random((2, 8, 8, 8, 1)).astype(np.float32),
         leaf_active=np.full((2, 64), 255, np.uint8),
         tile_origins=np.array([[16, 0, 0]], np.int32),
         tile_sizes=np.array([8], np.int32),
-        tile_values=np.array([0.4], np.float32),
+        tile_values=np.array([[0.4]], np.float32),
         tile_active=np.array([True]),
-        background=0.25,
+        background=np.array([0.25], np.float32),
         index_to_world=np.diag([0.05, 0.05, 0.05, 1.0]),
         active_box=np.array([[-8, 0, 0], [23, 15, 7]], np.int32),
     )
@@ -193,10 +193,10 @@ def sparse_grid():
 
 def dense_of(grid, lower, upper):
     """Every sample of a sparse grid between two inclusive indices, [z, y, x]."""
-    values = np.full(tuple(int(n) for n in (upper - lower + 1)[::-1]), grid.background, np.float32)
-    blocks = [(o, 8, v) for o, v in zip(grid.leaf_origins, grid.leaf_values, strict=True)]
+    values = np.full(tuple(int(n) for n in (upper - lower + 1)[::-1]), grid.background[0], np.float32)
+    blocks = [(o, 8, v) for o, v in zip(grid.leaf_origins, grid.leaf_values[..., 0], strict=True)]
     blocks += [
-        (o, s, v) for o, s, v in zip(grid.tile_origins, grid.tile_sizes, grid.tile_values, strict=True)
+        (o, s, v) for o, s, (v,) in zip(grid.tile_origins, grid.tile_sizes, grid.tile_values, strict=True)
     ]
     for origin, edge, value in blocks:
         x, y, z = origin - lower

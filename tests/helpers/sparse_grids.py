@@ -7,7 +7,12 @@ from clvol.volumes.grid import SparseGrid
 
 
 def grid_of(origins, values, background=0.0, tiles=()):
-    """Leaves (n, 3) x y z with values (n, 8, 8, 8), and tiles (origin, edge, value), all active."""
+    """Leaves (n, 3) x y z with values (n, 8, 8, 8), and tiles (origin, edge, value), all active.
+
+    Of several channels the values are (n, 8, 8, 8, channels), and background and tiles have as many.
+    """
+    values = np.asarray(values, np.float32)
+    background = np.array(background, np.float32).reshape(-1)
     origins = np.asarray(origins, np.int32)
     starts = np.array([tile[0] for tile in tiles], np.int32).reshape(-1, 3)
     edges = np.array([tile[1] for tile in tiles], np.int32)
@@ -15,11 +20,11 @@ def grid_of(origins, values, background=0.0, tiles=()):
     upper = np.concatenate([origins + 7, starts + edges[:, None] - 1]).max(axis=0)
     return SparseGrid(
         origins,
-        np.asarray(values, np.float32),
+        values.reshape(*values.shape[:4], -1),
         np.full((len(origins), 64), 255, np.uint8),
         starts,
         edges,
-        np.array([tile[2] for tile in tiles], np.float32),
+        np.array([tile[2] for tile in tiles], np.float32).reshape(-1, len(background)),
         np.ones(len(tiles), bool),
         background,
         np.eye(4),
@@ -40,15 +45,16 @@ def lumps(seed=1, places=18, leaves=60, background=0.0, tiles=()):
 
 
 def dense_of(grid):
-    """All samples of the active box and one voxel round it, [z, y, x]."""
+    """All samples of the active box and one voxel round it, [z, y, x], or [z, y, x, channel] of several."""
     lower, upper = grid.active_box[0] - 1, grid.active_box[1] + 1
-    values = np.full(tuple((upper - lower + 1)[::-1]), grid.background, np.float32)
+    values = np.empty((*(upper - lower + 1)[::-1], grid.channels), np.float32)
+    values[...] = grid.background
     tiles = zip(grid.tile_origins, grid.tile_sizes, grid.tile_values, strict=True)
     leaves = ((o, 8, v) for o, v in zip(grid.leaf_origins, grid.leaf_values, strict=True))
     for origin, edge, value in [*tiles, *leaves]:
         x, y, z = origin - lower
         values[z : z + edge, y : y + edge, x : x + edge] = value
-    return values
+    return values if grid.channels > 1 else values[..., 0]
 
 
 def volume_of(grid, filter_type="trilinear", clipped=True):

@@ -89,12 +89,12 @@ def test_a_file_without_grids_says_so():
 
 def test_grids_that_cannot_be_rendered_say_why(tmp_path):
     said = info(FILES / "bool.vdb")
-    assert said.startswith("density: cannot be rendered, its values are bool: those of float, double,")
+    assert said.startswith("density: cannot be rendered, its values are bool, which say where")
     frustum = ("NonlinearFrustumMap", [1.0] * 30)
-    grids = [GridSpec(name="v", grid_type="Tree_vec3s_5_4_3"), GridSpec(name="f", transform=frustum)]
+    grids = [GridSpec(name="v", grid_type="Tree_vec3i_5_4_3"), GridSpec(name="f", transform=frustum)]
     write_vdb(tmp_path / "a.vdb", grids)
     said = info(tmp_path / "a.vdb")
-    assert "v: cannot be rendered, its values are vec3s: those of float," in said
+    assert "v: cannot be rendered, its values are vec3i: those of float," in said
     assert "f: cannot be rendered, its transform is a NonlinearFrustumMap: affine ones" in said
 
 

@@ -271,13 +271,13 @@ def vdb(tmp_path, monkeypatch):
     def give(background=0.0):
         grid = SparseGrid(
             leaf_origins=np.array([[0, 0, 0]], np.int32),
-            leaf_values=np.ones((1, 8, 8, 8), np.float32),
+            leaf_values=np.ones((1, 8, 8, 8, 1), np.float32),
             leaf_active=np.full((1, 64), 255, np.uint8),
             tile_origins=np.zeros((0, 3), np.int32),
             tile_sizes=np.zeros(0, np.int32),
-            tile_values=np.zeros(0, np.float32),
+            tile_values=np.zeros((0, 1), np.float32),
             tile_active=np.zeros(0, bool),
-            background=background,
+            background=np.array([background], np.float32),
             index_to_world=translate([0, 0, 5]) @ scale(0.1),
             active_box=np.array([[0, 0, 0], [7, 7, 7]], np.int32),
             source="fog.vdb",

@@ -401,13 +401,13 @@ def test_a_grid_that_does_not_exist_is_answered_with_those_that_do():
 
 
 @pytest.mark.parametrize(
-    "kind", ["Tree_vec3s_5_4_3", "Tree_bool_5_4_3", "Tree_float_4_3", "Tree_vec3s_5_4_3_HalfFloat"]
+    "kind", ["Tree_vec3i_5_4_3", "Tree_bool_5_4_3", "Tree_float_4_3", "Tree_vec2s_5_4_3_HalfFloat"]
 )
 def test_other_value_types_are_named(tmp_path, kind):
     write_vdb(tmp_path / "a.vdb", [GridSpec(grid_type=kind)])
     with pytest.raises(VolumeError, match=re.escape(f"{kind!r}, which is not supported")) as caught:
         read_vdb(tmp_path / "a.vdb")
-    assert "float, double, int32, int64" in caught.value.hint
+    assert "float, double, half, int32, int64, vec3s, vec3d" in caught.value.hint
     assert "grid 'density'" in caught.value.where
 
 
