@@ -28,7 +28,7 @@ Examples:
 
 @click.command(cls=ExplainedCommand, epilog=EXAMPLES)
 @click.argument("file", metavar="FILE")
-@click.option("--grid", metavar="NAME", help="Only this grid of a .vdb, or this array of a .npz.")
+@click.option("--grid", metavar="NAME", help="Only this grid of a .vdb or .nvdb, or this array of a .npz.")
 @family_options()
 @majorant_scale_option
 @step_option
@@ -36,8 +36,8 @@ Examples:
 def info(file: str, grid: str | None, definitions: tuple[tuple[str, str], ...], **choices: Any) -> None:
     """Say what a volume or a scene contains.
 
-    FILE is a volume (.vdb, .vol, .npy, .npz, medical images, .tif, .h5 and others, see the formats in the
-    documentation): its grids, sizes, boxes, values and memory; or a scene
+    FILE is a volume (.vdb, .nvdb, .vol, .npy, .npz, medical images, .tif, .h5 and others, see the formats in
+    the documentation): its grids, sizes, boxes, values and memory; or a scene
     (.xml): its camera, film, media and lights, and the plan of its render: the choices that are in force
     and why, its features, its stages and what is compiled.  The choices below are those of `clvol render`.
     """

@@ -12,9 +12,10 @@ import numpy as np
 from clvol.base.memory import format_bytes
 from clvol.scene import records
 from clvol.scene.materials import Bsdf, Dielectric, Mask, Null, TwoSided
-from clvol.volumes import GridInfo, list_vdb, read_vdb, read_volume
+from clvol.volumes import GridInfo, read_volume
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
 from clvol.volumes.listing import box_of
+from clvol.volumes.read import SPARSE, list_sparse, read_sparse
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,21 +23,22 @@ if TYPE_CHECKING:
 
 def describe_volume(path: str, grid: str | None = None) -> list[str]:
     """Every grid of a volume file, or the one named; VolumeError where the file cannot be read."""
-    if grid is not None or Path(path).suffix.lower() != ".vdb":
+    if grid is not None or Path(path).suffix.lower() not in SPARSE:
         return describe_grid(read_volume(path, grid))
-    stored = list_vdb(path)
-    lines = [line for number, info in enumerate(stored) for line in _vdb_lines(path, number, info)]
+    stored = list_sparse(path)
+    lines = [line for number, info in enumerate(stored) for line in _stored_lines(path, number, info)]
     return lines or [f"{path}: it has no grids"]
 
 
-def _vdb_lines(path: str, number: int, stored: GridInfo) -> Iterator[str]:
+def _stored_lines(path: str, number: int, stored: GridInfo) -> Iterator[str]:
     if stored.unreadable:
         yield f"{stored.name}: cannot be rendered, {stored.unreadable}"
     else:
-        yield from describe_grid(read_vdb(path, number))
+        yield from describe_grid(read_sparse(path, number))
     precision = " in half precision" if stored.half else ""
     compression = ", ".join(stored.compression) or "no compression"
-    yield f"  stored   {stored.value_type}{precision}, {compression}, {stored.transform}"
+    kind = f", {stored.kind}" if stored.kind else ""
+    yield f"  stored   {stored.value_type}{precision}, {compression}, {stored.transform}{kind}"
     if stored.parent:
         yield f"  shared   its tree is that of {stored.parent}"
 

@@ -11,10 +11,11 @@ import numpy as np
 from clvol.scene.files import find_parameter, find_volume
 from clvol.scene.records import ConstVolume, GridVolume, Volume
 from clvol.scene.transforms import scale, translate
-from clvol.volumes import dense_from_array, read_vdb, read_volume
+from clvol.volumes import dense_from_array, read_volume
 from clvol.volumes.files import place
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
 from clvol.volumes.labelled import grid_from_labelled, is_labelled
+from clvol.volumes.read import SPARSE, read_sparse
 
 if TYPE_CHECKING:
     from clvol.scene.reader import Reader
@@ -31,7 +32,7 @@ def constvolume(reader: Reader) -> ConstVolume:
 
 
 def vdbvolume(reader: Reader) -> Volume:
-    """The `vdbvolume` plugin: a grid of an OpenVDB file, under the grid's own transform."""
+    """The `vdbvolume` plugin: a grid of an OpenVDB or NanoVDB file, under the grid's own transform."""
     if not reader.has("filename"):
         reader.fail("a vdbvolume needs a filename")
     path = find_parameter(reader, "filename")
@@ -39,10 +40,12 @@ def vdbvolume(reader: Reader) -> Volume:
     grids = reader.library.grids
     key = (path.resolve(), name)
     if key not in grids:
-        grids[key] = read_vdb(path, name)
+        grids[key] = read_sparse(path, name)
     grid = grids[key]
     if not isinstance(grid, SparseGrid):
-        reader.fail(f"a vdbvolume reads OpenVDB, not '{path.name}'", "filename", "use a gridvolume")
+        reader.fail(
+            f"a vdbvolume reads OpenVDB and NanoVDB, not '{path.name}'", "filename", "use a gridvolume"
+        )
     return _sparse_volume(reader, grid)
 
 
@@ -50,8 +53,8 @@ def gridvolume(reader: Reader) -> Volume:
     """The `gridvolume` plugin: a file, or an array [z, y, x] or [z, y, x, channel].
 
     Samples sit at the centres of equal cells of the unit cube (or of the file's own box) under
-    `to_world`; those of a .vdb file sit where a `vdbvolume` has them, and those of any other file that places
-    its samples, as medical images do, where it says, under `to_world` as well.
+    `to_world`; those of a .vdb or .nvdb file sit where a `vdbvolume` has them, and those of any other file
+    that places its samples, as medical images do, where it says, under `to_world` as well.
     """
     reader.ignore(accel=bool, raw=bool)
     wrap_mode = reader.string("wrap_mode", "clamp", WRAP_MODES)
@@ -112,7 +115,7 @@ def _grid(reader: Reader) -> Grid:
         reader.fail(f"the filename names an array itself, '{inside}'", "grid", "give one of them")
     name = inside if name is None else name
     grids = reader.library.grids
-    if name is None and path.suffix.lower() == ".vdb":
+    if name is None and path.suffix.lower() in SPARSE:
         name = "density"
     key = (path.resolve(), name)
     if key not in grids:

@@ -28,7 +28,7 @@ from clvol.scene.xml_values import (
     parse_spectrum,
     parse_xyz,
 )
-from clvol.volumes.read import CONVERSIONS, is_volume, volume_suffix
+from clvol.volumes.read import is_volume
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -69,9 +69,6 @@ def read_xml(path: Path, keywords: Mapping[str, object]) -> Node:
             hint = "name the .xml file in it" if os.path.isdir(path) else ""
             raise SceneError(f"'{path}' is {kind}, not a scene file", hint=hint)
         raise SceneError(f"scene file '{path}' does not exist")
-    if volume_suffix(path) in CONVERSIONS:
-        hint = CONVERSIONS[volume_suffix(path)]
-        raise SceneError(f"'{path}' is a volume that cannot be read, not a scene", hint=hint)
     if is_volume(path):
         hint = "`clvol info` shows it; a scene's medium can name it"
         raise SceneError(f"'{path}' is a volume, not a scene", hint=hint)

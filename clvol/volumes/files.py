@@ -27,7 +27,6 @@ MAX_BYTES = 4 << 30
 CHUNK = 4 << 20
 # Bytes from which on the system is asked whether it has them.
 ASKED = 64 << 20
-NANOVDB = "convert this NanoVDB file to OpenVDB: nanovdb_convert FILE.nvdb FILE.vdb"
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from clvol.errors import VolumeError
 from clvol.volumes import containers
 from clvol.volumes.files import TRUNCATED, open_binary
 from clvol.volumes.numpy_files import ZIP_ERRORS
-from clvol.volumes.vdb import list_vdb
+from clvol.volumes.read import SPARSE, list_sparse
 
 if TYPE_CHECKING:
     import os
@@ -26,22 +26,26 @@ class Listed:
 
     name : what `read_volume` takes for it; "" for the only one of a format without names.
     unreadable : why it cannot be read, "" where it can.
+    channels : values of a sample, 1 or 3; 0 where only reading tells, or it cannot be read.
+    kind : what its values are, "fog volume", "level set" or "staggered", "" where the file does not say.
     world_box : float64 (2, 3), a box in the world round its active samples; None where only reading tells.
     """
 
     name: str
     unreadable: str = ""
+    channels: int = 0
+    kind: str = ""
     world_box: np.ndarray | None = None
 
 
-def _vdb(path: str | os.PathLike[str]) -> list[Listed]:
+def _sparse(path: str | os.PathLike[str]) -> list[Listed]:
     found = []
-    for grid in list_vdb(path):
+    for grid in list_sparse(path):
         box = None
         if grid.active_box is not None and grid.index_to_world is not None:
             empty = (grid.active_box[0] > grid.active_box[1]).any()
             box = None if empty else box_of(grid.active_box, grid.index_to_world)
-        found.append(Listed(grid.name, grid.unreadable, box))
+        found.append(Listed(grid.name, grid.unreadable, grid.channels, grid.kind, box))
     return found
 
 
@@ -63,7 +67,7 @@ def _zarr(path: str | os.PathLike[str]) -> list[Listed]:
 
 
 LISTERS: dict[str, Callable[[str | os.PathLike[str]], list[Listed]]] = {
-    ".vdb": _vdb,
+    **dict.fromkeys(SPARSE, _sparse),
     ".npz": _npz,
     **dict.fromkeys(containers.HDF5_SUFFIXES, _hdf5),
     containers.ZARR_SUFFIX: _zarr,

@@ -9,20 +9,37 @@ from typing import TYPE_CHECKING
 from clvol.base.files import other_kind
 from clvol.errors import VolumeError
 from clvol.volumes import containers, itk, tiff, vti
-from clvol.volumes.files import NANOVDB
+from clvol.volumes.files import open_binary
 from clvol.volumes.numpy_files import read_numpy
-from clvol.volumes.vdb import read_vdb
+from clvol.volumes.nvdb import list_nvdb, read_nvdb
+from clvol.volumes.nvdb_header import MAGICS
+from clvol.volumes.vdb import list_vdb, read_vdb
 from clvol.volumes.vol import read_vol
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Callable
 
-    from clvol.volumes.grid import Grid
+    from clvol.volumes.grid import Grid, SparseGrid
+    from clvol.volumes.grid_info import GridInfo
 
 
-def _vdb(path: str | os.PathLike[str], grid: str | None) -> Grid:
-    return read_vdb(path) if grid is None else read_vdb(path, grid)
+def _is_nanovdb(path: str | os.PathLike[str]) -> bool:
+    """Whether a sparse file is NanoVDB: OpenVDB's and NanoVDB's are told apart by what they begin with."""
+    with open_binary(path) as file:
+        start = file.read(8)
+    return start in MAGICS or (Path(path).suffix.lower() == ".nvdb" and not start.startswith(b" BDV"))
+
+
+def list_sparse(path: str | os.PathLike[str]) -> list[GridInfo]:
+    """Grids of a .vdb or .nvdb file, as `list_vdb` and `list_nvdb` do."""
+    return list_nvdb(path) if _is_nanovdb(path) else list_vdb(path)
+
+
+def read_sparse(path: str | os.PathLike[str], grid: str | int | None = None) -> SparseGrid:
+    """One grid of a .vdb or .nvdb file, by name (default "density") or number, as their readers do."""
+    name = "density" if grid is None else grid
+    return read_nvdb(path, name) if _is_nanovdb(path) else read_vdb(path, name)
 
 
 def _vol(path: str | os.PathLike[str], grid: str | None) -> Grid:
@@ -32,7 +49,8 @@ def _vol(path: str | os.PathLike[str], grid: str | None) -> Grid:
 
 
 READERS: dict[str, Callable[[str | os.PathLike[str], str | None], Grid]] = {
-    ".vdb": _vdb,
+    ".vdb": read_sparse,
+    ".nvdb": read_sparse,
     ".vol": _vol,
     ".npy": read_numpy,
     ".npz": read_numpy,
@@ -43,8 +61,8 @@ READERS: dict[str, Callable[[str | os.PathLike[str], str | None], Grid]] = {
 }
 """Suffix -> reader of a file and of the grid that is named, if any."""
 SUFFIXES = (*READERS, containers.ZARR_SUFFIX)
-CONVERSIONS = {".nvdb": NANOVDB}
-"""Suffixes of volumes that cannot be read, and what makes one of them that can."""
+SPARSE = (".vdb", ".nvdb")
+"""Suffixes of files of sparse grids, with transforms of their own."""
 
 _INSIDE = re.compile(
     rf"(?P<file>.*({'|'.join(map(re.escape, (*containers.HDF5_SUFFIXES, containers.ZARR_SUFFIX)))}))"
@@ -66,10 +84,9 @@ def split_address(address: str) -> tuple[str, str | None]:
 
 
 def is_volume(path: str | os.PathLike[str]) -> bool:
-    """Whether a name is a volume's, readable or not, rather than a scene's: by its suffix, or a folder."""
+    """Whether a name is a volume's rather than a scene's: by its suffix, or a folder."""
     name, inside = split_address(str(path))
-    suffix = volume_suffix(name)
-    return inside is not None or suffix in SUFFIXES or suffix in CONVERSIONS or Path(name).is_dir()
+    return inside is not None or volume_suffix(name) in SUFFIXES or Path(name).is_dir()
 
 
 def read_volume(path: str | os.PathLike[str], grid: str | None = None) -> Grid:
@@ -77,10 +94,11 @@ def read_volume(path: str | os.PathLike[str], grid: str | None = None) -> Grid:
 
     Parameters
     ----------
-    path : .vdb, .vol, .npy, .npz; with the extra `science` .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, .dcm,
-        .tif, .h5, .nc, .zarr, .vti, and a folder of DICOM slices.  "scan.h5:/density" names an array inside.
-    grid : the grid of a .vdb (default "density"), the array of a .npz, .h5, .zarr or .vti (default the only
-        one), the series of a DICOM folder; or of an array of more axes "[3]", its part.
+    path : .vdb, .nvdb, .vol, .npy, .npz; with the extra `science` .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd,
+        .dcm, .tif, .h5, .nc, .zarr, .vti, and a folder of DICOM slices.  "scan.h5:/density" names an array
+        inside.
+    grid : the grid of a .vdb or .nvdb (default "density"), the array of a .npz, .h5, .zarr or .vti (default
+        the only one), the series of a DICOM folder; or of an array of more axes "[3]", its part.
 
     Raises VolumeError as the reader of the format does, and for other suffixes; OptionError where the package
     that reads the format is missing.
@@ -104,5 +122,5 @@ def read_volume(path: str | os.PathLike[str], grid: str | None = None) -> Grid:
                 f"is {kind}, not a volume file", str(path), f"give a file: {listed} can be read"
             )
         what = f"files ending in {suffix!r}" if suffix else "files without a suffix"
-        raise VolumeError(f"{what} cannot be read, {listed} can", str(path), CONVERSIONS.get(suffix, ""))
+        raise VolumeError(f"{what} cannot be read, {listed} can", str(path))
     return READERS[suffix](path, grid)

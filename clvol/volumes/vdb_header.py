@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.volumes.files import NANOVDB
 from clvol.volumes.grid import KINDS
 from clvol.volumes.vdb_stream import ACTIVE_MASK, BLOSC, ZIP, VdbStream
 
@@ -92,8 +91,6 @@ class GridHeader:
 def read_file_header(stream: VdbStream) -> int:
     """Check magic and version, step over the file's metadata; the number of grids."""
     magic = stream.take(min(stream.end, 8))
-    if magic.startswith(b"NanoVDB"):
-        stream.fail("is not an OpenVDB file", NANOVDB)
     if magic != MAGIC:
         stream.fail("is not an OpenVDB file (wrong magic number)", "")
     (version,) = stream.unpack("<I")
@@ -211,10 +208,15 @@ def check_transform(stream: VdbStream, header: GridHeader) -> np.ndarray:
             f"transform {header.transform!r} is not supported, affine maps are",
             "resample the grid to an affine transform",
         )
+    check_matrix(stream, matrix, header.transform)
+    return matrix
+
+
+def check_matrix(stream: VdbStream, matrix: np.ndarray, name: str) -> None:
+    """VolumeError unless a matrix (4, 4), of a map of this name, is affine and can be inverted."""
     if not np.isfinite(matrix).all() or not np.array_equal(matrix[3], [0, 0, 0, 1]):
-        stream.fail(f"the matrix of its {header.transform} is not affine and finite")
+        stream.fail(f"the matrix of its {name} is not affine and finite")
     with np.errstate(over="ignore", under="ignore"):
         determinant = np.linalg.det(matrix[:3, :3])
     if not np.isfinite(determinant) or determinant == 0:
-        stream.fail(f"the matrix of its {header.transform} cannot be inverted")
-    return matrix
+        stream.fail(f"the matrix of its {name} cannot be inverted")

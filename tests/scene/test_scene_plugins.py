@@ -282,7 +282,7 @@ def vdb(tmp_path, monkeypatch):
             active_box=np.array([[0, 0, 0], [7, 7, 7]], np.int32),
             source="fog.vdb",
         )
-        monkeypatch.setattr("clvol.scene.volume.read_vdb", lambda path, name: grid)
+        monkeypatch.setattr("clvol.scene.volume.read_sparse", lambda path, name: grid)
         monkeypatch.setattr("clvol.scene.volume.read_volume", lambda path, name: grid)
         return str(path)
 

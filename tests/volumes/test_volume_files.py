@@ -345,9 +345,9 @@ def test_read_volume_goes_by_the_suffix(tmp_path):
     refuses(lambda: read_volume(tmp_path / "a.VOL", "density"), "no grid named 'density'", "a.VOL")
 
 
-@pytest.mark.parametrize("name", ["a.nvdb", "a.raw", "a"])
+@pytest.mark.parametrize("name", ["a.exr", "a.raw", "a"])
 def test_read_volume_says_what_it_reads(name):
-    refuses(lambda: read_volume(name), r"\.vdb, \.vol, \.npy, \.npz, .* can", name)
+    refuses(lambda: read_volume(name), r"\.vdb, \.nvdb, \.vol, \.npy, \.npz, .* can", name)
 
 
 # Coefficients
