@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 import os
 from contextlib import nullcontext
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
+from clvol.cli.frames import Frames, Series, check_series, frame_options
 from clvol.cli.messages import exit_by, logging_to, mention
 from clvol.cli.options import (
     ExplainedCommand,
@@ -30,6 +32,8 @@ from clvol.errors import Error
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from rich.console import Console
+
     from clvol.base.output_files import StrPath
     from clvol.picture.profile import Profile
     from clvol.picture.result import Result
@@ -40,6 +44,8 @@ EXAMPLES = """
 Examples:
   clvol render scenes/fire.vdb -o fire.png
   clvol render smoke.vdb -o smoke.png --light studio --view front --quality draft
+  clvol render 'smoke.####.vdb' -o 'smoke.####.png' --frames 1-100:2
+  clvol render smoke.vdb -o turn.mp4 --turntable 96
   clvol render scenes/fire.xml -o fire.exr
   clvol render scenes/cloud.xml -o cloud.exr -o cloud.png --spp 256
   clvol render scenes/cloud.xml -o cloud.exr --time 20 -v
@@ -136,6 +142,7 @@ class RenderCommand(ExplainedCommand):
     metavar="FILE",
     help="Write when each kernel ran, as a .json that Perfetto and chrome://tracing show.",
 )
+@frame_options
 @quiet_option
 def render(
     scene: str,
@@ -152,49 +159,92 @@ def render(
     well, and lit; what was chosen is printed. Ctrl-C ends the render early and keeps the picture so far, and
     so do SIGTERM and SIGHUP.
     """
-    from clvol.base.progress import RichProgress, error_console
-    from clvol.cli.profile import profile_lines
-    from clvol.picture.saving import save_all
+    from clvol.base.progress import error_console
 
     shown = Shown.taken(options)
     asked = Asked.taken(scene, options, definitions)
     extent = extent_of(options, asked.is_volume)
-    _check_files(scene, outputs, trace, shown, bool(options["aov"]))
-    console = error_console()
+    listed, turntable = options.pop("frames"), options.pop("turntable")
+    overwrite, fps = options.pop("overwrite"), options.pop("fps")
+    frames = Frames.of(asked, outputs, listed, turntable)
+    first = outputs if frames is None else frames.first_outputs
+    _check_files(scene, first, trace, shown, bool(options["aov"]))
+    console, profiled = error_console(), options.pop("profile")
+    options |= extent | {"profile": profiled or trace is not None}
+    painter = Painter(asked, options, shown, trace, quiet, console)
     with logging_to(console, verbose):
-        import clvol
+        if frames is not None:
+            check_series(options, shown, trace, frames)
+            series = Series(
+                asked, frames, painter.frame, shown, options["size"], overwrite, quiet, console, fps
+            )
+            series.run()
+        painter.picture(outputs, profiled)
 
-        loaded, lines = asked.open(options["size"])
-        if lines and not quiet:
-            mention(lines)
-        _check_room(loaded, outputs, options)
-        piloted = options["technique"] == "auto:pilot"
-        if piloted and not quiet and not console.is_terminal:
+
+@dataclass
+class Painter:
+    """Renders scenes and saves the pictures, as the command line says."""
+
+    asked: Asked
+    options: dict[str, Any]
+    shown: Shown
+    trace: str | None
+    quiet: bool
+    console: Console
+
+    def result(self, scene: Scene, outputs: Sequence[str]) -> Result:
+        """Render a scene that fits the outputs."""
+        import clvol
+        from clvol.base.progress import RichProgress
+
+        _check_room(scene, outputs, self.options)
+        piloted = self.options["technique"] == "auto:pilot"
+        if piloted and not self.quiet and not self.console.is_terminal:
             from clvol.lab.repeat import announcement
 
-            mention([announcement(loaded, options)], err=True)
-        with nullcontext(False) if quiet else RichProgress(console) as progress:
-            profile = options.pop("profile")
-            options |= extent | {"profile": profile or trace is not None}
-            result = clvol.render(loaded, progress=progress, **options)
+            mention([announcement(scene, self.options)], err=True)
+        with nullcontext(False) if self.quiet else RichProgress(self.console) as progress:
+            result = clvol.render(scene, progress=progress, **self.options)
         if piloted:
             from clvol.lab.repeat import with_definitions
 
-            result.metadata["repeat"] = with_definitions(result.metadata["repeat"], dict(definitions))
-        failures = save_all(shown.encoder(result), outputs)
-        if trace is not None and result.profile:
-            failures |= _save_trace(result.profile, trace)
-    written = [output for output in outputs if output not in failures]
-    if result.stats["interrupted"]:
-        saved = ", saved what there is" if written else ""
-        mention([f"clvol: interrupted after {result.samples[1]} spp{saved}"], err=True)
-    if not quiet:
-        mention(_summary(result, written))
-    if profile and result.profile:
-        mention(profile_lines(result.profile))
-    for failure in failures.values():
-        raise failure
-    exit_by(result.stats["interrupted"])
+            result.metadata["repeat"] = with_definitions(result.metadata["repeat"], self.asked.definitions)
+        return result
+
+    def frame(self, scene: Scene, outputs: Sequence[str]) -> Result:
+        """Render and save one of many; one that was ended early is not saved."""
+        from clvol.picture.saving import save_all
+
+        result = self.result(scene, outputs)
+        if not result.stats["interrupted"]:
+            for failure in save_all(self.shown.encoder(result), outputs).values():
+                raise failure
+        return result
+
+    def picture(self, outputs: Sequence[str], profiled: bool) -> NoReturn:
+        """Render and save the only one, tell of it, and exit."""
+        from clvol.cli.profile import profile_lines
+        from clvol.picture.saving import save_all
+
+        loaded, lines = self.asked.open(self.options["size"])
+        if lines and not self.quiet:
+            mention(lines)
+        result = self.result(loaded, outputs)
+        failures = save_all(self.shown.encoder(result), outputs)
+        if self.trace is not None and result.profile:
+            failures |= _save_trace(result.profile, self.trace)
+        written = [output for output in outputs if output not in failures]
+        if result.stats["interrupted"]:
+            saved = ", saved what there is" if written else ""
+            mention([f"clvol: interrupted after {result.samples[1]} spp{saved}"], err=True)
+        if not self.quiet:
+            mention(_summary(result, written))
+        if profiled and result.profile:
+            mention(profile_lines(result.profile))
+        for failure in failures.values():
+            raise failure
+        exit_by(result.stats["interrupted"])
 
 
 def _check_room(loaded: Scene, outputs: Sequence[str], options: dict[str, Any]) -> None:

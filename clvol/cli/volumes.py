@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
     from clvol.cli.options import F
     from clvol.scene.records import Scene
+    from clvol.staging.source import Source
+    from clvol.staging.stage import Fixed
 
     _OptionType = click.ParamType[Any, Any]
 else:
@@ -112,13 +114,22 @@ class Asked:
                 raise click.UsageError(f"{spelled(option)} is for volumes, and this is a scene")
         return cls(name, volume, given, dict(definitions))
 
-    def open(self, size: tuple[int, int] | None) -> tuple[Scene, Sequence[str]]:
-        """The scene, and what was chosen for it, in a line each."""
+    def open(
+        self,
+        size: tuple[int, int] | None,
+        source: Source | None = None,
+        fixed: Fixed | None = None,
+        turn: float | None = None,
+    ) -> tuple[Scene, Sequence[str]]:
+        """The scene, and what was chosen for it, in a line each.
+
+        source, fixed, turn : of a frame of a sequence, as `clvol.staging.stage.stage` takes them.
+        """
         from clvol.staging.source import Source
         from clvol.staging.stage import stage
 
         if self.is_volume:
-            staged = stage(Source.of(self.name), self.given, size_of(size))
+            staged = stage(source or Source.of(self.name), self.given, size_of(size), fixed=fixed, turn=turn)
             return staged.load(), staged.lines
         import clvol
         from clvol.scene.views import before

@@ -10,6 +10,8 @@ from clvol.scene.transforms import look_at
 
 FOV = 35.0
 """Degrees along the longer side of the picture."""
+RING = 180
+"""Points of the ring that a point describes on a turntable."""
 MARGIN = 0.08
 """Share of the picture that is left free on each side."""
 
@@ -91,3 +93,14 @@ def frame(
     to_world[:3, :3] = rotation
     to_world[:3, 3] = centre + rotation @ np.array([*offsets, -distance])
     return View(to_world, azimuth, elevation, distance)
+
+
+def revolved(points: np.ndarray, axes: Axes, centre: np.ndarray) -> np.ndarray:
+    """The rings (n, 3) that points describe as they turn about the vertical axis through the centre."""
+    local = points - centre
+    height = local @ axes.up
+    radius = np.linalg.norm(local - height[:, None] * axes.up, axis=1)
+    angles = np.linspace(0, 2 * np.pi, RING, endpoint=False)[:, None]
+    rings = np.cos(angles)[..., None] * axes.front + np.sin(angles)[..., None] * axes.right
+    turned: np.ndarray = centre + radius[:, None] * rings + height[:, None] * axes.up
+    return turned.reshape(-1, 3)

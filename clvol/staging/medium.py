@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clvol.errors import VolumeError
-from clvol.scene.records import GridVolume
+from clvol.scene.records import ConstVolume, GridVolume
 from clvol.staging.finding import IN_UNITS, Found, find_grids, plain
+from clvol.staging.source import Field
 from clvol.staging.thickness import WANTED, Rays, glow, thickness
 
 if TYPE_CHECKING:
     from types import SimpleNamespace
 
-    from clvol.staging.source import Field, Source
+    from clvol.staging.source import Source
 
 ALBEDO, DARK = 0.95, 0.5
 """Of smoke and cloud, and of the smoke of a fire."""
@@ -41,36 +42,54 @@ class Grids:
     colour: Field | None
 
     @classmethod
-    def of(cls, source: Source, options: SimpleNamespace) -> Grids:
-        """Find them by name, and read those that are used."""
+    def of(cls, source: Source, options: SimpleNamespace, of_sequence: bool = False) -> Grids:
+        """Find them by name, and read those that are used.
+
+        Of a sequence a file without any grid is an empty frame.
+        """
+        listed = source.listed()
+        if of_sequence and not listed:
+            return cls(Found(""), Field("", {}, ConstVolume((0.0,))), None, None, None)
         asked = {kind: getattr(options, kind) for kind in ("density", "temperature", "flame", "colour")}
-        found = find_grids(source.listed(), asked, source.name)
+        found = find_grids(listed, asked, source.name)
         fields = {name: source.open(name) for name in dict.fromkeys(vars(found).values()) if name is not None}
         others = (found.temperature, found.flame, found.colour)
         grids = cls(found, fields[found.density], *(None if n is None else fields[n] for n in others))
         grids.check(source.name)
-        return grids.without_dark(options)
+        return grids.dark() if options.emission_scale == 0 else grids.lit()
 
     def check(self, where: str) -> None:
         """VolumeError for a grid of another number of channels than its use has."""
-        for kind, has in (("temperature", self.temperature), ("flame", self.flame)):
-            if has is not None and not has.empty and has.channels != 1 and kind == "temperature":
-                raise VolumeError(f"grid {has.name!r} has three channels, a {kind} has one", where)
-        if self.colour is not None and not self.colour.empty and self.colour.channels != 3:
-            hint = "--colour none leaves it out"
-            raise VolumeError(f"grid {self.colour.name!r} has one channel, a colour has three", where, hint)
+        heat, colour = self.temperature, self.colour
+        if heat is not None and not heat.empty and heat.channels != 1:
+            hint = "temperature 'none' leaves it out"
+            raise VolumeError(f"grid {heat.name!r} has three channels, a temperature has one", where, hint)
+        if colour is not None and not colour.empty and colour.channels != 3:
+            hint = "colour 'none' leaves it out"
+            raise VolumeError(f"grid {colour.name!r} has one channel, a colour has three", where, hint)
 
-    def without_dark(self, options: SimpleNamespace) -> Grids:
-        """Without what glows where nothing does."""
-        if options.emission_scale == 0:
-            return replace(self, temperature=None, flame=None)
-        glowing = [f if f is not None and f.peak > 0 else None for f in (self.temperature, self.flame)]
-        return replace(self, temperature=glowing[0], flame=glowing[1])
+    def dark(self) -> Grids:
+        """Without anything that glows."""
+        return replace(self, temperature=None, flame=None)
+
+    def lit(self) -> Grids:
+        """Without what is nowhere above 0: where there is a flame to be, nothing glows but for it."""
+        if self.flame is not None and self.flame.peak <= 0:
+            return self.dark()
+        heat = self.temperature
+        return replace(self, temperature=heat if heat is not None and heat.peak > 0 else None)
 
     @property
     def burns(self) -> bool:
         """Whether anything glows."""
         return self.temperature is not None or self.flame is not None
+
+    @property
+    def heat(self) -> Field | None:
+        """What gives the colour of the glow by its temperature; None of a flame with colours of its own."""
+        if self.temperature is None and self.flame is not None and self.flame.channels == 3:
+            return None
+        return self.temperature or self.flame
 
 
 @dataclass(frozen=True)
@@ -90,40 +109,40 @@ class Scales:
         return (peak - self.coldest) * self.kelvin
 
 
-def choose_scales(grids: Grids, options: SimpleNamespace, rays: Rays) -> Scales:
-    """Those that a user gives, and for the others those with which the picture reads well along the rays."""
+def choose_scales(grids: Grids, options: SimpleNamespace, rays: Rays, peak: float) -> Scales:
+    """Those that a user gives, and for the others those with which the picture reads well along the rays.
+
+    peak : the greatest temperature there is, in all frames of a sequence.
+    """
+    values = None if grids.density.empty else _sampled(grids.density, rays)
     density = options.density_scale
-    values = None
     if density is None:
         density = 1.0
-        if plain(grids.found.density) not in IN_UNITS and not grids.density.empty:
-            values = _sampled(grids.density, rays)
+        if plain(grids.found.density) not in IN_UNITS and values is not None:
             thick = thickness(values, rays)
             density = _rounded(WANTED / thick) if thick > 0 else 1.0
-    kelvin, coldest = _kelvin(grids, options) if grids.burns else (1.0, 0.0)
+    kelvin, coldest = _kelvin(grids, options, peak) if peak > 0 else (1.0, 0.0)
     emission = options.emission_scale
     if emission is None:
         emission = 1.0
-        if grids.burns and not grids.density.empty:
-            values = _sampled(grids.density, rays) if values is None else values
-            absorbed = 1 - float(np.mean(albedo_of(grids, options)))
+        if grids.burns and values is not None:
+            absorbed = 1 - float(np.mean(options.albedo))
             emission = _brightness(grids, density * values, rays, absorbed, coldest)
     return Scales(density, kelvin, emission, coldest)
 
 
-def _kelvin(grids: Grids, options: SimpleNamespace) -> tuple[float, float]:
+def _kelvin(grids: Grids, options: SimpleNamespace, peak: float) -> tuple[float, float]:
     """Kelvin of a step of 1 in temperature, and the temperature up to which nothing glows.
 
     The greatest temperature has its own kelvin where it can be kelvin at all, else those of a fire.
     """
-    heat = grids.temperature or glowing(grids)
-    coldest = _rounded(COLD * heat.peak) if grids.flame is None else 0.0
+    coldest = _rounded(COLD * peak) if grids.flame is None else 0.0
     hottest = HOTTEST
     if options.temperature_scale is not None:
-        hottest = options.temperature_scale * heat.peak
-    elif grids.temperature and heat.peak > KELVIN:
-        hottest = heat.peak
-    exact = hottest / (heat.peak - coldest)
+        hottest = options.temperature_scale * peak
+    elif grids.temperature and peak > KELVIN:
+        hottest = peak
+    exact = hottest / (peak - coldest)
     return (_rounded(exact) if hottest == HOTTEST else exact), coldest
 
 
@@ -140,24 +159,20 @@ def glowing(grids: Grids) -> Field:
     return field
 
 
-def albedo_of(grids: Grids, options: SimpleNamespace) -> tuple[float, ...]:
-    """As given, or what is usual."""
-    return options.albedo or ((DARK,) if grids.burns else (ALBEDO,))
-
-
 def medium(grids: Grids, options: SimpleNamespace, scales: Scales) -> dict[str, Any]:
     """The plugin."""
     described: dict[str, Any] = {
         "type": "heterogeneous",
         "sigma_t": grids.density.plugin,
         "scale": scales.density,
-        "albedo": grids.colour.plugin if grids.colour else _value(albedo_of(grids, options)),
+        "albedo": grids.colour.plugin if grids.colour else _value(options.albedo),
         "phase": {"type": "hg", "g": ANISOTROPY if options.anisotropy is None else options.anisotropy},
     }
     if grids.burns:
         described["emission"] = glowing(grids).plugin
         described["emission_scale"] = scales.emission
-        described["temperature"] = (grids.temperature or glowing(grids)).plugin
+    if grids.burns and grids.heat is not None:
+        described["temperature"] = grids.heat.plugin
         described["temperature_scale"] = scales.kelvin
         if scales.coldest:
             described["temperature_offset"] = scales.coldest

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from clvol.staging.looks import LOOKS
-from clvol.staging.medium import albedo_of, glowing
+from clvol.staging.medium import glowing
 from clvol.staging.options import VIEWS
 from clvol.staging.thickness import PERCENTILE, thickness
 
@@ -14,19 +14,18 @@ if TYPE_CHECKING:
     from types import SimpleNamespace
 
     from clvol.staging.framing import View
-    from clvol.staging.medium import Grids
-    from clvol.staging.source import Source
+    from clvol.staging.medium import Grids, Scales
     from clvol.staging.stage import Fixed
     from clvol.staging.thickness import Rays
 
 
 def said(
-    source: Source, grids: Grids, options: SimpleNamespace, view: View, rays: Rays, fixed: Fixed
+    grids: Grids, options: SimpleNamespace, view: View, rays: Rays, fixed: Fixed, scales: Scales
 ) -> Iterator[str]:
-    """The lines; each names the option that changes it."""
-    yield _density(grids, options, rays, fixed.scales.density)
+    """The lines."""
+    yield _density(grids, options, rays, scales.density)
     if grids.burns:
-        yield _glow(grids, options, fixed)
+        yield _glow(grids, options, scales)
     if grids.colour:
         yield f"colour   {_named(grids.colour.name)}: the albedo"
     axis, why = fixed.up
@@ -35,7 +34,7 @@ def said(
     placed = f"azimuth {view.azimuth:g}, elevation {view.elevation:g}, distance {view.distance:.4g}"
     yield f"camera   {name + ': ' if name else ''}{placed}"
     summary = LOOKS[options.light].summary if options.light in LOOKS else "an environment"
-    dimmed = ", dimmed for what glows" if options.light in LOOKS and grids.burns else ""
+    dimmed = ", dimmed for what glows" if options.light in LOOKS and fixed.burns else ""
     yield f"light    {options.light}: {summary}{dimmed}"
 
 
@@ -44,25 +43,21 @@ def _density(grids: Grids, options: SimpleNamespace, rays: Rays, scale: float) -
     if grids.density.empty:
         return f"density  {name}: empty, there is nothing to see"
     cubic = ", voxels taken as cubes" if grids.density.cubic else ""
-    albedo = ", ".join(f"{one:g}" for one in albedo_of(grids, options))
+    albedo = "" if grids.colour else f"; albedo {', '.join(f'{one:g}' for one in options.albedo)}"
     thick = scale * thickness(rays.sample(grids.density.volume, grids.density.means), rays)
-    return (
-        f"density  {name} times {scale:g}: optical thickness {thick:.2g} at the {PERCENTILE:g}th percentile; "
-        f"albedo {albedo}{cubic}"
-    )
+    depth = f"optical thickness {thick:.2g} at the {PERCENTILE:g}th percentile"
+    return f"density  {name} times {scale:.4g}: {depth}{albedo}{cubic}"
 
 
-def _glow(grids: Grids, options: SimpleNamespace, fixed: Fixed) -> str:
-    heat = grids.temperature or glowing(grids)
-    scales = fixed.scales
+def _glow(grids: Grids, options: SimpleNamespace, scales: Scales) -> str:
+    bright = f"glow     {_named(glowing(grids).name)} times {scales.emission:g}"
+    heat = grids.heat
+    if heat is None:
+        return f"{bright}, in its own colours"
     cold = f"; none up to {scales.coldest:g}" if scales.coldest else ""
     guessed = ", guessed" if options.temperature_scale is None and scales.kelvin != 1 else ""
-    colour = (
-        f"{_named(heat.name)} times {scales.kelvin:.4g} K{guessed}: up to {scales.hottest(heat.peak):.0f} K"
-    )
-    return (
-        f"glow     {_named(glowing(grids).name)} times {scales.emission:g}, in the colour of {colour}{cold}"
-    )
+    kelvin = f"times {scales.kelvin:.4g} K{guessed}: up to {scales.hottest(heat.peak):.0f} K{cold}"
+    return f"{bright}, in the colour of {_named(heat.name)} {kelvin}"
 
 
 def _named(name: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -11,10 +11,11 @@ import numpy as np
 
 from clvol.scene.loader import load_staged
 from clvol.scene.records import GridVolume
-from clvol.scene.transforms import scale, translate
-from clvol.staging.framing import FOV, Axes, View, frame
+from clvol.scene.transforms import rotate, scale, translate
+from clvol.staging.framing import FOV, Axes, View, frame, revolved
 from clvol.staging.lights import environment_file, look_emitters
-from clvol.staging.medium import Grids, Scales, choose_scales, medium
+from clvol.staging.looks import LOOKS
+from clvol.staging.medium import ALBEDO, DARK, Grids, Scales, choose_scales, medium
 from clvol.staging.options import OPTIONS, VIEWS, checked
 from clvol.staging.said import said
 from clvol.staging.source import Field, Source
@@ -41,11 +42,35 @@ FLOOR, FLOOR_SIZE = 0.3, 40.0
 
 @dataclass(frozen=True, eq=False)
 class Fixed:
-    """What all frames of a sequence share: the points (n, 3) that are framed, what is up, and the scales."""
+    """What all frames of a sequence share.
+
+    Parameters
+    ----------
+    points : (n, 3), the outermost of what is seen in the world.
+    up : the axis, and why.
+    burns, flames : whether anything glows, and whether flames say what.
+    peak : the greatest temperature.
+    scales : what the values of the grids are multiplied by; None to choose them.
+    """
 
     points: np.ndarray
     up: tuple[str, str]
-    scales: Scales
+    burns: bool
+    flames: bool
+    peak: float
+    scales: Scales | None = None
+
+    @classmethod
+    def of(cls, source: Source, grids: Grids, options: SimpleNamespace) -> Fixed:
+        """Of one volume."""
+        up = (options.up, "") if options.up else guess_up(source.path)
+        heat = grids.heat.peak if grids.burns and grids.heat is not None else 0.0
+        return cls(shown_points(grids), up, grids.burns, grids.flame is not None, heat)
+
+    @property
+    def box(self) -> np.ndarray:
+        """Box (2, 3) round the points."""
+        return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +94,7 @@ def stage(
     size: tuple[int, int] = SIZE,
     spp: int = SPP,
     fixed: Fixed | None = None,
+    turn: float | None = None,
 ) -> Staged:
     """Describe the scene of a volume.
 
@@ -77,29 +103,50 @@ def stage(
     given : options of `clvol.staging.options`; None for those that are not.
     size, spp : pixels (width, height) of the picture, and samples for each.
     fixed : what other frames of the sequence have, else chosen for this volume.
+    turn : degrees by which a turntable has been turned; None where there is none.
     """
     options = checked(given)
-    grids = Grids.of(source, options)
-    options.light = options.light or ("rim" if grids.burns else "sun")
-    up = fixed.up if fixed else (options.up, "") if options.up else guess_up(source.path)
-    points = fixed.points if fixed else shown_points(grids)
-    box = np.stack([points.min(axis=0), points.max(axis=0)])
-    axes, (azimuth, elevation) = Axes.of(up[0]), angles(options)
-    view = frame(points, axes, azimuth, elevation, size, options.distance)
-    rays = Rays.through(box, view, size)
-    scales = fixed.scales if fixed else choose_scales(grids, options, rays)
+    grids = Grids.of(source, options, of_sequence=fixed is not None)
+    fixed = fixed or Fixed.of(source, grids, options)
+    if fixed.flames and grids.flame is None:
+        grids = grids.dark()
+    settle(options, fixed)
+    axes, view = camera(fixed, options, size, turn)
+    rays = Rays.through(fixed.box, view, size)
+    if fixed.scales is None:
+        fixed = replace(fixed, scales=choose_scales(grids, options, rays, fixed.peak))
+    assert fixed.scales is not None
     hidden = {} if options.background is None else {"hide_emitters": True}
     description: dict[str, Any] = {
         "type": "scene",
         "integrator": {"type": "volpath", "max_depth": MAX_DEPTH, "rr_depth": RR_DEPTH, **hidden},
-        "sensor": sensor(view, box, size, spp),
-        **lights(options, axes, azimuth, DIMMED if grids.burns else 1.0),
-        **({"floor": floor(box, axes)} if options.ground else {}),
+        "sensor": sensor(view, fixed.box, size, spp),
+        **lights(options, axes, view.azimuth, DIMMED if fixed.burns else 1.0),
+        **({"floor": floor(fixed.box, axes)} if options.ground else {}),
     }
     if not grids.density.empty:
-        description["volume"] = bounds(grids.density) | {"interior": medium(grids, options, scales)}
-    fixed = Fixed(points, up, scales)
-    return Staged(description, tuple(said(source, grids, options, view, rays, fixed)), fixed, source)
+        description["volume"] = bounds(grids.density) | {"interior": medium(grids, options, fixed.scales)}
+    lines = tuple(said(grids, options, view, rays, fixed, fixed.scales))
+    return Staged(description, lines, fixed, source)
+
+
+def settle(options: SimpleNamespace, fixed: Fixed) -> None:
+    """Fill in what is usual for what burns, and for what does not."""
+    options.light = options.light or ("rim" if fixed.burns else "sun")
+    options.albedo = options.albedo or ((DARK,) if fixed.burns else (ALBEDO,))
+
+
+def camera(
+    fixed: Fixed, options: SimpleNamespace, size: tuple[int, int], turn: float | None = None
+) -> tuple[Axes, View]:
+    """The directions of the world, and the camera; on a turntable it goes round what it sees."""
+    axes, (azimuth, elevation) = Axes.of(fixed.up[0]), angles(options)
+    if turn is None:
+        return axes, frame(fixed.points, axes, azimuth, elevation, size, options.distance)
+    centre = fixed.box.mean(axis=0)
+    view = frame(revolved(fixed.points, axes, centre), axes, azimuth, elevation, size, options.distance)
+    about = translate(centre) @ rotate(axes.up, turn) @ translate(-centre)
+    return axes, replace(view, to_world=about @ view.to_world, azimuth=azimuth + turn)
 
 
 def angles(options: SimpleNamespace) -> tuple[float, float]:
@@ -136,7 +183,7 @@ def sensor(view: View, box: np.ndarray, size: tuple[int, int], spp: int) -> dict
 def lights(options: SimpleNamespace, axes: Axes, azimuth: float, dimmed: float) -> dict[str, Any]:
     """Those of the look, or of the file."""
     sun = None if options.sun_direction is None else np.array(options.sun_direction)
-    if options.light.lower().endswith((".exr", ".hdr")):
+    if options.light not in LOOKS:
         return {"environment": environment_file(options.light, axes, azimuth)}
     return look_emitters(options.light, axes, azimuth, sun, dimmed)
 

@@ -163,7 +163,7 @@ def test_a_colour_grid_is_the_albedo() -> None:
     colour = np.stack([ball(), 0.5 * ball(), 0.1 * ball()], axis=-1)
     medium = clvol.volume_scene({"density": ball(), "Cd": colour}).shapes[0].interior
     assert isinstance(medium.albedo, GridVolume) and medium.albedo.grid.values.shape[-1] == 3
-    with pytest.raises(VolumeError, match="one channel, a colour has three; --colour none"):
+    with pytest.raises(VolumeError, match="one channel, a colour has three; colour"):
         clvol.volume_scene({"density": ball(), "Cd": ball()})
 
 
