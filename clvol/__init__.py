@@ -30,7 +30,17 @@ if TYPE_CHECKING:
     from clvol.picture.merging import merge
     from clvol.picture.result import Result
     from clvol.planning.plan import Plan
-    from clvol.scene import load_dict, load_file, look_at, rotate, scale, translate
+    from clvol.scene import (
+        SceneParameters,
+        load_dict,
+        load_file,
+        load_string,
+        look_at,
+        rotate,
+        scale,
+        translate,
+        traverse,
+    )
     from clvol.scene.records import Scene
     from clvol.staging.stage import volume_scene
 
@@ -47,12 +57,14 @@ __all__ = [
     "Result",
     "Scene",
     "SceneError",
+    "SceneParameters",
     "SelfTest",
     "VolumeError",
     "__version__",
     "compare",
     "load_dict",
     "load_file",
+    "load_string",
     "look_at",
     "merge",
     "plan",
@@ -63,6 +75,7 @@ __all__ = [
     "selftest",
     "trace_ray",
     "translate",
+    "traverse",
     "volume_scene",
 ]
 
@@ -78,7 +91,17 @@ _MODULES = {
     "clvol.picture.merging": ["merge"],
     "clvol.picture.result": ["Result"],
     "clvol.planning.plan": ["Plan"],
-    "clvol.scene": ["load_dict", "load_file", "look_at", "rotate", "scale", "translate"],
+    "clvol.scene": [
+        "SceneParameters",
+        "load_dict",
+        "load_file",
+        "load_string",
+        "look_at",
+        "rotate",
+        "scale",
+        "translate",
+        "traverse",
+    ],
     "clvol.scene.records": ["Scene"],
     "clvol.staging.stage": ["volume_scene"],
 }

@@ -167,6 +167,8 @@ def statistics(session: Session, samples: int) -> dict[str, Any]:
             **wavefront.seconds,
         },
         "items": wavefront.handled.by_stage(session.plan.stages),
+        "uploaded_bytes": session.uploaded,
+        "kernels_built": session.built,
         "launches": wavefront.launches,
         "waves": wavefront.waves,
         "slots": wavefront.pool.slots,

@@ -13,17 +13,19 @@ import numpy as np
 from clvol import layout
 from clvol.base.arguments import check_seed
 from clvol.device.programs import build_stages, stage_units
-from clvol.device.side_builds import SideBuilds
+from clvol.device.side_builds import SideBuilds, Unit
 from clvol.errors import RenderError
 from clvol.planning.in_force import warnings
 from clvol.planning.plan import Plan
 from clvol.planning.settled import Tuning
 from clvol.rendering.light_cache import light_cache_unit
 from clvol.rendering.profiler import Profiler, timed
+from clvol.rendering.residence import Residence, compiled
 from clvol.rendering.upload import upload_scene
 from clvol.rendering.wavefront import Pool, Wavefront
 from clvol.scene.digest import scene_digest
 from clvol.tables.camera import camera_rays
+from clvol.tables.light_cache import light_cache_record
 from clvol.tables.pixel_filter import FILTER_BINS
 from clvol.tables.prepare import PreparedScene, prepare
 
@@ -48,6 +50,7 @@ class Session:
     setup_seconds : from the scene's records to buffers and kernels.
     kernel_seconds : the part of it that went into building kernels, nothing where a cache has them.
     seconds : that the last run took.
+    uploaded, built : bytes of the scene, and kernels, that opening it took.
     """
 
     device: Device
@@ -57,6 +60,8 @@ class Session:
     setup_seconds: float = 0.0
     kernel_seconds: float = 0.0
     seconds: float = 0.0
+    uploaded: int = 0
+    built: int = 0
 
     @classmethod
     def for_scene(
@@ -106,13 +111,16 @@ class Session:
         record = render_record(prepared, seed)
         slots = Pool.for_device(device, plan, pool)
         groups, pixels = slots.slots // plan.tuning.group_slots, int(np.prod(record["film_size"]))
+        residence, programs = Residence.of(prepared.scene, device), len(device.programs)
+        uploaded_before = residence.uploaded
         with timed(profiler, "units"):
-            units = stage_units(plan, groups, pixels)
-            others = [light_cache_unit(prepared)] if plan.light_cache else []
+            grid = light_cache_record(prepared).tobytes() if plan.light_cache else b""
+            key = compiled(plan), groups, pixels, grid
+            units, others = residence.made("units", key, lambda: _units(prepared, groups, pixels))
         with SideBuilds(device, [*units.values(), *others]) as builds:
             uploading = time.perf_counter()
             with timed(profiler, "upload"):
-                buffers = upload_scene(device, prepared, record)
+                buffers = upload_scene(device, prepared, record, residence)
             uploaded = time.perf_counter()
             with timed(profiler, "kernels"):
                 kernels = build_stages(device, units)
@@ -125,7 +133,10 @@ class Session:
             builds.remember()
         ready = time.perf_counter()
         kernel_seconds = uploading - started + built - uploaded + ready - warming
-        return cls(device, prepared, wavefront, seed, ready - started, kernel_seconds)
+        session = cls(device, prepared, wavefront, seed, ready - started, kernel_seconds)
+        session.uploaded = residence.uploaded - uploaded_before
+        session.built = len(device.programs) - programs
+        return session
 
     @property
     def plan(self) -> Plan:
@@ -199,6 +210,12 @@ class Session:
         if done == 0:
             raise nothing_finished(interrupted())
         self.seconds = spent()
+
+
+def _units(prepared: PreparedScene, groups: int, pixels: int) -> tuple[dict[str, Unit], list[Unit]]:
+    """What is built: of each stage, and of the cache of lights."""
+    others = [light_cache_unit(prepared)] if prepared.plan.light_cache else []
+    return stage_units(prepared.plan, groups, pixels), others
 
 
 def nothing_finished(urgency: int) -> BaseException:

@@ -16,9 +16,11 @@ from clvol.accel.skipping import marked_empty
 from clvol.layout import BRICK_SAMPLES
 from clvol.planning.lanes import lanes
 from clvol.rendering.light_cache import light_cache_buffers
+from clvol.rendering.residence import Residence, Same, compiled
 from clvol.scene import records
 from clvol.tables.affine import rows_3x4
 from clvol.tables.blackbody import blackbody_table
+from clvol.tables.light_cache import light_cache_record, rows
 from clvol.tables.lights import LightTable, envmap_arrays, light_table
 from clvol.tables.materials import material_table
 from clvol.tables.media import medium_table, phase_table
@@ -32,34 +34,58 @@ if TYPE_CHECKING:
     from clvol.tables.surfaces import Surfaces
 
 
-def upload_scene(device: Device, prepared: PreparedScene, render: np.ndarray) -> dict[str, cl.Buffer]:
-    """Buffers of every scene argument that the plan needs, by argument name, but the RENDER record."""
-    buffers: dict[str, cl.Buffer] = {}
+def upload_scene(
+    device: Device, prepared: PreparedScene, render: np.ndarray, residence: Residence | None = None
+) -> dict[str, cl.Buffer]:
+    """Buffers of every scene argument that the plan needs, by argument name, but the RENDER record.
+
+    `residence`: where some of them may be already.
+    """
+    there = residence or Residence(device)
     needed = {argument.name for argument in layout.arguments(prepared.plan.macros)}
+    buffers = _volume_buffers(there, prepared) if "volumes" in needed else {}
+    arrays = {**_medium_arrays(prepared, needed), **_light_arrays(prepared, there, needed)}
     if "sobol" in needed:
-        buffers["sobol"] = _buffer(device, block_table(bool(prepared.plan.macros["CLVOL_JOINT"])))
-    if "volumes" in needed:
-        buffers |= _volume_buffers(device, prepared)
-    if "media" in needed:
-        buffers["media"] = _buffer(device, medium_table(prepared))
-    if "boundary_masks" in needed:
-        buffers["boundary_masks"] = _buffer(device, prepared.boundaries.masks())
+        arrays["sobol"] = block_table(bool(prepared.plan.macros["CLVOL_JOINT"]))
+    if "filter_cdf" in needed:
+        arrays["filter_cdf"] = filter_cdf(prepared.scene.film.rfilter)
+    buffers |= {name: there.put(name, array) for name, array in arrays.items()}
+    if "light_cache" in needed:
+        camera = device.memory.upload(render, "the camera")
+
+        def fill() -> dict[str, cl.Buffer]:
+            return light_cache_buffers(device, prepared, {**buffers, "render": camera})
+
+        names = sorted(name for name in buffers if name not in _NOT_OF_THE_CACHE)
+        grid = light_cache_record(prepared).tobytes(), rows(prepared)
+        key = compiled(prepared.plan), grid, tuple(names), Same(*(buffers[name] for name in names))
+        buffers |= there.made("light_cache", key, fill)
+    return buffers
+
+
+_NOT_OF_THE_CACHE = ("sobol", "filter_cdf")
+"""Buffers that the cache of lights has nothing to do with."""
+
+
+def _medium_arrays(prepared: PreparedScene, needed: set[str]) -> dict[str, np.ndarray]:
+    """Media, what bounds them, and their majorants, by argument name."""
+    arrays: dict[str, np.ndarray] = {}
     entries = prepared.boundaries.entries
     tables = (prepared.majorants[number] for number in prepared.matter.of_entry)
     majorants = [table for table in tables if table is not None]
+    if "media" in needed:
+        arrays["media"] = medium_table(prepared)
+    if "boundary_masks" in needed:
+        arrays["boundary_masks"] = prepared.boundaries.masks()
     if "majorants" in needed:
         bounds = [_bounds(m) if lanes(prepared.plan) else m.majorant for m in majorants]
-        buffers["majorants"] = _buffer(device, np.concatenate(bounds))
+        arrays["majorants"] = np.concatenate(bounds)
     if "majorant_links" in needed:
-        buffers["majorant_links"] = _buffer(
-            device, np.concatenate([m.links for m in majorants if m.links is not None])
-        )
+        arrays["majorant_links"] = np.concatenate([m.links for m in majorants if m.links is not None])
     if "kd_nodes" in needed:
-        buffers["kd_nodes"] = _buffer(
-            device, np.concatenate([m.nodes for m in majorants if m.nodes is not None])
-        )
+        arrays["kd_nodes"] = np.concatenate([m.nodes for m in majorants if m.nodes is not None])
     if "controls" in needed:
-        buffers["controls"] = _table(device, [m.control for m in majorants if m.control is not None])
+        arrays["controls"] = _table([m.control for m in majorants if m.control is not None])
     if "residuals" in needed:
         residuals = [m.residual for m in majorants if m.residual is not None]
         channels = max(rows.shape[1] - 1 for rows in residuals)
@@ -67,28 +93,26 @@ def upload_scene(device: Device, prepared: PreparedScene, render: np.ndarray) ->
             np.hstack([np.broadcast_to(rows[:, :-1], (len(rows), channels)), rows[:, -1:]])
             for rows in residuals
         ]
-        buffers["residuals"] = _table(device, parts)
+        arrays["residuals"] = _table(parts)
     if "blackbody" in needed:
-        buffers["blackbody"] = _buffer(device, blackbody_table())
+        arrays["blackbody"] = blackbody_table()
     if "phases" in needed:
-        buffers["phases"] = _buffer(device, phase_table(entries))
+        arrays["phases"] = phase_table(entries)
+    return arrays
+
+
+def _light_arrays(prepared: PreparedScene, there: Residence, needed: set[str]) -> dict[str, np.ndarray]:
+    """Lights and surfaces, by argument name."""
     lights = light_table(
         prepared.scene, prepared.centre, prepared.radius, prepared.surfaces, prepared.plan.uniform_share
     )
     arrays = {"emitters": lights.emitters, "light_faces": lights.faces, "light_cdf": lights.cdf}
     if prepared.surfaces is not None:
         arrays |= _surface_arrays(prepared.surfaces, lights)
-    buffers |= {name: _buffer(device, array) for name, array in arrays.items() if name in needed}
     if "envmap" in needed:
         [environment] = (e for e in prepared.scene.emitters if isinstance(e, records.EnvmapEmitter))
-        for name, array in envmap_arrays(environment).items():
-            buffers[name] = _buffer(device, array)
-    if "filter_cdf" in needed:
-        buffers["filter_cdf"] = _buffer(device, filter_cdf(prepared.scene.film.rfilter))
-    if "light_cache" in needed:
-        known = {**buffers, "render": device.memory.upload(render, "the camera")}
-        buffers |= light_cache_buffers(device, prepared, known)
-    return buffers
+        arrays |= there.made("envmap", Same(environment), lambda: envmap_arrays(environment))
+    return {name: array for name, array in arrays.items() if name in needed}
 
 
 def _bounds(majorant: PreparedMajorant) -> np.ndarray:
@@ -119,20 +143,14 @@ def _surface_arrays(surfaces: Surfaces, lights: LightTable) -> dict[str, np.ndar
     return {name: array for name, array in arrays.items() if array is not None}
 
 
-def _buffer(device: Device, array: np.ndarray) -> cl.Buffer:
-    return device.memory.upload(
-        array, "the scene", "use a device with more memory, or simpler meshes and pictures"
-    )
-
-
-def _table(device: Device, parts: list[np.ndarray]) -> cl.Buffer:
+def _table(parts: list[np.ndarray]) -> np.ndarray:
     """Rows per majorant cell of every medium, one after the other; a grey medium repeats its channel."""
     width = max(part.shape[1] for part in parts)
     rows = [np.broadcast_to(part, (len(part), width)) for part in parts]
-    return _buffer(device, np.concatenate(rows).astype(np.float32))
+    return np.concatenate(rows).astype(np.float32)
 
 
-def _volume_buffers(device: Device, prepared: PreparedScene) -> dict[str, cl.Buffer]:
+def _volume_buffers(there: Residence, prepared: PreparedScene) -> dict[str, cl.Buffer]:
     """Records, top grids and the brick pool of every volume."""
     table = np.zeros(len(prepared.volumes), layout.VOLUME)
     tops, brick_offset, top_offset = [], 0, 0
@@ -148,13 +166,19 @@ def _volume_buffers(device: Device, prepared: PreparedScene) -> dict[str, cl.Buf
         tops.append(np.where(top > 0, top * np.int32(bricks.channels), top))
         top_offset += bricks.top.size
         brick_offset += bricks.brick_count * bricks.channels
-    pool = device.memory.allocate(
-        brick_offset * BRICK_SAMPLES * 4,
-        "the scene's volumes",
-        "use a device with more memory, or a volume of lower resolution",
-    )
-    for record, volume in zip(table, prepared.volumes, strict=True):
-        for first, samples in volume.bricks.stored():
-            at = (int(record["brick_offset"]) + first * volume.bricks.channels) * BRICK_SAMPLES * 4
-            cl.enqueue_copy(device.queue, pool, samples, dst_offset=at, is_blocking=True)
-    return {"volumes": _buffer(device, table), "tops": _buffer(device, np.concatenate(tops)), "bricks": pool}
+    tops_array = np.concatenate(tops)
+
+    def fill() -> cl.Buffer:
+        """The samples of every brick, a chunk at a time."""
+        device, size = there.device, brick_offset * BRICK_SAMPLES * 4
+        hint = "use a device with more memory, or a volume of lower resolution"
+        pool = device.memory.allocate(size, "the scene's volumes", hint)
+        for record, volume in zip(table, prepared.volumes, strict=True):
+            for first, samples in volume.bricks.stored():
+                at = (int(record["brick_offset"]) + first * volume.bricks.channels) * BRICK_SAMPLES * 4
+                cl.enqueue_copy(device.queue, pool, samples, dst_offset=at, is_blocking=True)
+        there.uploaded += size
+        return pool
+
+    pool = there.made("bricks", Same(*(volume.bricks for volume in prepared.volumes)), fill)
+    return {"volumes": there.put("volumes", table), "tops": there.put("tops", tops_array), "bricks": pool}

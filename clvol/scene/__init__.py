@@ -3,7 +3,18 @@
 Syntax, defaults and checks live here; nothing of OpenCL, and nothing that reads voxels from a file.
 """
 
-from clvol.scene.loader import load_dict, load_file
+from clvol.scene.loader import load_dict, load_file, load_string
+from clvol.scene.parameters import SceneParameters, traverse
 from clvol.scene.transforms import look_at, rotate, scale, translate
 
-__all__ = ["load_dict", "load_file", "look_at", "rotate", "scale", "translate"]
+__all__ = [
+    "SceneParameters",
+    "load_dict",
+    "load_file",
+    "load_string",
+    "look_at",
+    "rotate",
+    "scale",
+    "translate",
+    "traverse",
+]

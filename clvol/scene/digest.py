@@ -12,7 +12,7 @@ _BLOCKS, _BLOCK_VALUES = 256, 4096
 take seconds."""
 
 
-_APART = ("source", "name", "spp", "seed", "choices", "sensors", "component_format")
+_APART = ("source", "name", "spp", "seed", "choices", "sensors", "component_format", "kept")
 """Fields that do not tell scenes apart."""
 
 

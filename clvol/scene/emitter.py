@@ -61,15 +61,16 @@ def envmap(reader: Reader) -> EnvmapEmitter:
         reader.fail(
             f"an envmap has at least 2 x 3 pixels, got {radiance.shape[1]} x {radiance.shape[0]}", place
         )
-    _check_radiance(reader, radiance, np.float32(reader.number("scale", 1.0, minimum=0.0)), place)
+    if fault := check_radiance(radiance, np.float32(reader.number("scale", 1.0, minimum=0.0))):
+        reader.fail(fault, place, f"at most {BRIGHTEST:g}")
     to_world = reader.transform()
     if not keeps_angles(to_world):
         reader.fail("to_world of an envmap must not stretch or shear it", "to_world", "rotate it only")
     return EnvmapEmitter(radiance, to_world, source)
 
 
-def _check_radiance(reader: Reader, radiance: np.ndarray, scale: np.float32, place: str) -> None:
-    """Multiply a picture by `scale` and take slightly negative values as 0, in place; refuse others."""
+def check_radiance(radiance: np.ndarray, scale: np.float32) -> str:
+    """Multiply a picture by `scale` and take slightly negative values as 0, in place; else what is wrong."""
     largest = radiance.max() * scale
     for rows in bands(*radiance.shape[:2]):
         band = radiance[rows]
@@ -77,12 +78,10 @@ def _check_radiance(reader: Reader, radiance: np.ndarray, scale: np.float32, pla
         broken = ~np.isfinite(band) | (band < -NEGLIGIBLE * largest) | (band > BRIGHTEST)
         if broken.any():
             row, column = np.argwhere(broken)[0][:2]
-            reader.fail(
-                f"radiance must be finite and >= 0; it is not at row {rows.start + row}, column {column}",
-                place,
-                f"at most {BRIGHTEST:g}",
-            )
+            row += rows.start
+            return f"radiance must be finite and >= 0; it is not at row {row}, column {column}"
         np.maximum(band, 0, out=band)
+    return ""
 
 
 def directional(reader: Reader) -> DirectionalEmitter:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,7 @@ from clvol.scene.nodes import Node, from_dict
 from clvol.scene.reader import build
 from clvol.scene.records import ConstantEmitter, EnvmapEmitter, Integrator, Scene, Sensor, Shape
 from clvol.scene.vocabulary import listed
-from clvol.scene.xml import read_xml
+from clvol.scene.xml import read_xml, read_xml_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -116,6 +117,33 @@ def load_file(path: str | Path, **defaults: object) -> Scene:
     return _build(read_xml(Path(path), defaults), source=str(path))
 
 
+def load_string(text: str, **defaults: object) -> Scene:
+    """Read a Mitsuba 3 XML scene from a string.
+
+    Parameters
+    ----------
+    text : str
+        The XML.  Files it names are looked for in its `<path>`s, then in the working directory.
+    **defaults
+        As for `load_file`.
+
+    Returns
+    -------
+    Scene
+        What `clvol.render` takes.
+
+    Raises
+    ------
+    SceneError, VolumeError
+        As `load_file`.
+    """
+    if not isinstance(text, str):
+        raise SceneError(
+            f"load_string takes a string of XML, not {shown(text)}", hint="load_dict takes dicts"
+        )
+    return _build(read_xml_text(text, defaults), source="")
+
+
 def load_dict(scene: Mapping[str, object]) -> Scene:
     """Make a scene from nested dicts, as `mi.load_dict` takes them.
 
@@ -176,7 +204,7 @@ def _build(root: Node, source: str, grids: Grids | None = None) -> Scene:
         film=sensors[0].film,
         integrator=_integrator(records["integrator"], _what_has_media(sensors, records["shape"])),
         shapes=tuple(record for _, record in records["shape"]),
-        emitters=tuple(record for _, record in emitters),
+        emitters=tuple(replace(record, name=node.id) for node, record in emitters),
         spp=sensors[0].sampler.spp,
         seed=sensors[0].sampler.seed,
         source=source,
@@ -187,7 +215,7 @@ def _build(root: Node, source: str, grids: Grids | None = None) -> Scene:
 def _sensors(sensors: list[tuple[Node, Sensor]], root: Node) -> tuple[Sensor, ...]:
     if not sensors:
         raise SceneError("the scene has no sensor", root.where, 'add a <sensor type="perspective">')
-    return tuple(record for _, record in sensors)
+    return tuple(replace(record, name=node.id) for node, record in sensors)
 
 
 def _is_inside(node: Node, record: object, library: Library) -> bool:

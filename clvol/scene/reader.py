@@ -100,7 +100,7 @@ class Reader:
         number = _float(value)
         inside = minimum < number < maximum if open_interval else minimum <= number <= maximum
         if not np.isfinite(number) or not inside:
-            self._wrong(name, _range(minimum, maximum, open_interval), number)
+            self._wrong(name, range_in_words(minimum, maximum, open_interval), number)
         return number
 
     def integer(self, name: str, default: int, minimum: int, maximum: int = 2**31 - 1) -> int:
@@ -198,7 +198,7 @@ class Reader:
         else:
             self._wrong(name, "a number, an rgb or a spectrum", value)
         if not np.isfinite(rgb).all() or (rgb < 0).any() or (rgb > maximum * (1 + ROUNDING)).any():
-            self._wrong(name, _range(0, maximum, False), rgb.tolist())
+            self._wrong(name, range_in_words(0, maximum, False), rgb.tolist())
         if (rgb > maximum).any():
             log.warning("%s: %.9g is taken as %g", self.node.place(name), rgb.max(), maximum)
         components = tuple(np.minimum(rgb, maximum).tolist())
@@ -328,7 +328,8 @@ def _float(value: Real) -> float:
         return np.inf
 
 
-def _range(minimum: float, maximum: float, open_interval: bool) -> str:
+def range_in_words(minimum: float, maximum: float, open_interval: bool) -> str:
+    """An interval as messages name it, as "in [0, 1]"."""
     if np.isinf(minimum) and np.isinf(maximum):
         return "finite"
     if np.isinf(maximum):

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from clvol.scene.kept import Kept
 from clvol.scene.materials import Bsdf, Null
 
 if TYPE_CHECKING:
@@ -238,6 +239,7 @@ class ConstantEmitter:
     """Environment of the same radiance in every direction."""
 
     radiance: Spectrum = (1.0,)
+    name: str = field(default="", compare=False, repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,6 +249,7 @@ class EnvmapEmitter:
     radiance: np.ndarray
     to_world: np.ndarray
     source: str = ""
+    name: str = field(default="", compare=False, repr=False)
 
     def __repr__(self) -> str:
         return f"<EnvmapEmitter {self.source}: {self.radiance.shape[1]} x {self.radiance.shape[0]}>"
@@ -258,6 +261,7 @@ class DirectionalEmitter:
 
     irradiance: Spectrum
     direction: tuple[float, float, float]
+    name: str = field(default="", compare=False, repr=False)
 
 
 @dataclass(frozen=True)
@@ -266,6 +270,7 @@ class PointEmitter:
 
     intensity: Spectrum
     position: tuple[float, float, float]
+    name: str = field(default="", compare=False, repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,6 +285,7 @@ class SpotEmitter:
     to_world: np.ndarray
     cutoff_angle: float = 20.0
     beam_width: float = 15.0
+    name: str = field(default="", compare=False, repr=False)
 
 
 Emitter = ConstantEmitter | EnvmapEmitter | DirectionalEmitter | PointEmitter | SpotEmitter
@@ -311,6 +317,7 @@ class Sensor:
     camera: Perspective
     film: Film
     sampler: Sampler
+    name: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -330,6 +337,7 @@ class Scene:
     seed: int = 0
     source: str = ""  # file the scene came from, for messages and metadata
     sensors: tuple[Sensor, ...] = ()
+    kept: Kept = field(default_factory=Kept, repr=False)
 
     def __post_init__(self) -> None:
         if not self.sensors:

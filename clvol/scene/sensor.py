@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -82,11 +83,32 @@ def _field_of_view(reader: Reader) -> tuple[float, str]:
 def _rigid(reader: Reader) -> np.ndarray:
     """`to_world`, which for a camera may turn, move and mirror, but not scale."""
     matrix = reader.transform()
-    if not np.allclose(matrix[:3, :3].T @ matrix[:3, :3], np.eye(3), atol=2e-3):
+    if not is_rigid(matrix):
         reader.fail(
             "to_world of a sensor must not scale or shear", "to_world", "change fov or the distance instead"
         )
     return matrix
+
+
+def is_rigid(matrix: np.ndarray) -> bool:
+    """Whether a 4x4 transform may be a camera's: it turns, moves and mirrors, and nothing else."""
+    return bool(np.allclose(matrix[:3, :3].T @ matrix[:3, :3], np.eye(3), atol=2e-3))
+
+
+def field_of_view_x(sensor: Perspective, film: Film) -> float:
+    """Horizontal field of view in radians, from a field of view along any axis."""
+    aspect = film.width / film.height
+    axis = sensor.fov_axis
+    if axis == "smaller":
+        axis = "x" if film.width <= film.height else "y"
+    elif axis == "larger":
+        axis = "x" if film.width >= film.height else "y"
+    tangent = math.tan(math.radians(sensor.fov) / 2)
+    if axis == "y":
+        tangent *= aspect
+    elif axis == "diagonal":
+        tangent *= aspect / math.hypot(aspect, 1.0)
+    return 2 * math.atan(tangent)
 
 
 def film_fault(width: int, height: int) -> str:

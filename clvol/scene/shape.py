@@ -65,14 +65,19 @@ def cylinder(reader: Reader) -> Shape:
         reader.fail("p0 and p1 are the same point", "p1" if reader.has("p1") else "p0")
     matrix = reader.transform() @ translate(first) @ _frame((last - first) / length)
     shape = _shape(reader, "cylinder", matrix @ scale([radius, radius, length]))
-    gram = matrix[:3, :3].T @ matrix[:3, :3]
-    if shape.emission and not np.allclose(gram, np.diag(np.diag(gram)[[0, 0, 2]]), atol=1e-4 * gram.max()):
+    if shape.emission and not stays_round(matrix):
         reader.fail(
             "to_world of a cylinder that emits must not stretch it across or shear it",
             "to_world",
             "scale x and y alike in the cylinder's own frame",
         )
     return shape
+
+
+def stays_round(matrix: np.ndarray) -> bool:
+    """Whether a 4x4 transform keeps circles round z circles, and z across them."""
+    gram = matrix[:3, :3].T @ matrix[:3, :3]
+    return bool(np.allclose(gram, np.diag(np.diag(gram)[[0, 0, 2]]), atol=1e-4 * gram.max()))
 
 
 def mesh(reader: Reader) -> Shape:

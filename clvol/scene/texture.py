@@ -31,14 +31,8 @@ def bitmap(reader: Reader) -> Bitmap:
     else:
         place = source = "bitmap"
         pixels = image_from_array(reader.array(place), reader.node.place(place), raw)
-    for rows in bands(*pixels.shape[:2]):
-        band = pixels[rows]
-        broken = ~((band >= -NEGLIGIBLE) & (band <= 1 + NEGLIGIBLE))
-        if broken.any():
-            row, column = np.argwhere(broken)[0][:2]
-            shown, row = band[row, column].tolist(), rows.start + row
-            reader.fail(f"texels must be in [0, 1]; at row {row}, column {column} there is {shown}", place)
-        np.clip(band, 0, 1, out=band)
+    if fault := check_texels(pixels):
+        reader.fail(fault, place)
     return Bitmap(
         pixels,
         _to_uv(reader),
@@ -46,6 +40,19 @@ def bitmap(reader: Reader) -> Bitmap:
         reader.string("wrap_mode", "repeat", ("repeat", "mirror", "clamp")),
         source,
     )
+
+
+def check_texels(pixels: np.ndarray) -> str:
+    """Cut what lies beyond 0..1 by rounding, in place; what is wrong with the others, "" if nothing."""
+    for rows in bands(*pixels.shape[:2]):
+        band = pixels[rows]
+        broken = ~((band >= -NEGLIGIBLE) & (band <= 1 + NEGLIGIBLE))
+        if broken.any():
+            row, column = np.argwhere(broken)[0][:2]
+            shown, row = band[row, column].tolist(), rows.start + row
+            return f"texels must be in [0, 1]; at row {row}, column {column} there is {shown}"
+        np.clip(band, 0, 1, out=band)
+    return ""
 
 
 def checkerboard(reader: Reader) -> Checkerboard:

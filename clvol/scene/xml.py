@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import re
 from numbers import Real
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +19,7 @@ from clvol.scene import transforms
 from clvol.scene.files import find
 from clvol.scene.nodes import NAMELESS, Node
 from clvol.scene.vocabulary import did_you_mean, join_hints, listed
-from clvol.scene.xml_tree import Element, parse_elements
+from clvol.scene.xml_tree import Element, parse_elements, parse_text
 from clvol.scene.xml_values import (
     fail,
     parse_float,
@@ -32,7 +33,6 @@ from clvol.volumes.read import is_volume
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from pathlib import Path
 
 PLUGIN_TAGS = (
     *("scene", "shape", "bsdf", "medium", "volume", "phase", "emitter"),
@@ -62,7 +62,7 @@ def read_xml(path: Path, keywords: Mapping[str, object]) -> Node:
     """
     if str(path).lstrip().startswith("<"):
         raise SceneError(
-            f"a file's name is wanted, got XML: '{shortened(str(path), 40)}'", hint="write it to a .xml file"
+            f"a file's name is wanted, got XML: '{shortened(str(path), 40)}'", hint="load_string takes XML"
         )
     if not os.path.isfile(path):  # false, unlike Path.is_file, for a name too long for the system
         if kind := other_kind(path):
@@ -73,7 +73,24 @@ def read_xml(path: Path, keywords: Mapping[str, object]) -> Node:
         hint = "`clvol info` shows it; a scene's medium can name it"
         raise SceneError(f"'{path}' is a volume, not a scene", hint=hint)
     reader = _XmlReader(keywords)
-    root = reader.file(path, [], "")
+    return _finished(reader, reader.file(path, [], ""), keywords, str(path))
+
+
+TEXT = "the text"
+"""What errors call XML that is in no file."""
+
+
+def read_xml_text(text: str, keywords: Mapping[str, object]) -> Node:
+    """The scene in XML; as `read_xml`, with files looked for in the working directory."""
+    if not text.lstrip("\ufeff \t\r\n").startswith("<"):
+        hint = "load_file takes the name of a file"
+        raise SceneError(f"XML is wanted, got '{shortened(text, 40)}'", hint=hint)
+    reader = _XmlReader(keywords)
+    return _finished(reader, reader.root(parse_text(text, TEXT), [Path()]), keywords, TEXT)
+
+
+def _finished(reader: _XmlReader, root: Node, keywords: Mapping[str, object], where: str) -> Node:
+    """A scene that was read, if it is one and every keyword is in it."""
     root.aliases = reader.aliases
     if root.kind != "scene":
         raise SceneError(f"the root element must be <scene>, not <{root.kind}>", root.where)
@@ -82,7 +99,7 @@ def read_xml(path: Path, keywords: Mapping[str, object]) -> Node:
         names = sorted(set(reader.values) - set(keywords) | reader.used)
         raise SceneError(
             f"no ${unused[0]} in the scene uses the value given for '{unused[0]}'",
-            str(path),
+            where,
             join_hints(did_you_mean(unused[0], names), f"the scene's names: {listed(names)}"),
         )
     return root
@@ -109,7 +126,12 @@ class _XmlReader:
         if self.files > MAX_FILES:
             raise SceneError(f"the scene includes more than {MAX_FILES} files", included_at)
         self.reading.append(resolved)
-        element = parse_elements(path)
+        node = self.root(parse_elements(path), [path.parent, *folders])
+        self.reading.pop()
+        return node
+
+    def root(self, element: Element, folders: list[Path]) -> Node:
+        """The node of a document's root, whose files are looked for in `folders`."""
         if element.tag not in PLUGIN_TAGS:
             fail(element, f"unknown element <{element.tag}>", "a scene file begins with <scene>")
         attributes = self.attributes(element, "type", "id", "name", "version")
@@ -117,9 +139,7 @@ class _XmlReader:
         if not re.fullmatch(r"[23]\.\d+(\.\d+)?", version, re.ASCII):
             what = f"version '{version}' is not supported" if version else "the version is missing"
             fail(element, what, _version_hint(element.tag, version))
-        node = self.plugin(element, [path.parent, *folders])
-        self.reading.pop()
-        return node
+        return self.plugin(element, folders)
 
     def include(self, element: Element, parent: Node) -> None:
         """Put the children of an included <scene>, or another included plugin, into `parent`."""

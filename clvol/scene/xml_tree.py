@@ -35,8 +35,13 @@ def parse_elements(path: Path) -> Element:
     """
     with open_regular(path, SceneError, "scene file") as file:
         text = file.read()
+    return parse_text(text, str(path))
+
+
+def parse_text(text: bytes | str, name: str) -> Element:
+    """The root element of XML; as `parse_elements`, which errors call `name`."""
     parser = expat.ParserCreate()
-    tree = _TreeMaker(path, parser)
+    tree = _TreeMaker(name, parser)
     parser.StartElementHandler = tree.start
     parser.EndElementHandler = tree.end
     parser.CharacterDataHandler = tree.text
@@ -46,26 +51,26 @@ def parse_elements(path: Path) -> Element:
         parser.Parse(text, True)
     except expat.ExpatError as error:
         reason = expat.ErrorString(error.code)
-        raise SceneError(f"broken XML: {reason}", f"{path}:{error.lineno}") from None
+        raise SceneError(f"broken XML: {reason}", f"{name}:{error.lineno}") from None
     except (LookupError, ValueError) as error:  # encodings that expat leaves to Python
-        raise SceneError(f"cannot decode the scene file: {error}", str(path), "save it as UTF-8") from None
+        raise SceneError(f"cannot decode the scene file: {error}", name, "save it as UTF-8") from None
     return tree.open[0].children[0]
 
 
 class _TreeMaker:
     """Expat's handlers; `open` is the stack of elements being read, with a stand-in for the document."""
 
-    def __init__(self, path: Path, parser: expat.XMLParserType) -> None:
-        self.path, self.parser = path, parser
-        self.open = [Element("", {}, str(path))]
+    def __init__(self, name: str, parser: expat.XMLParserType) -> None:
+        self.name, self.parser = name, parser
+        self.open = [Element("", {}, name)]
 
     def fail(self, what: str, hint: str = "") -> NoReturn:
-        raise SceneError(what, f"{self.path}:{self.parser.CurrentLineNumber}", hint)
+        raise SceneError(what, f"{self.name}:{self.parser.CurrentLineNumber}", hint)
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         if len(self.open) > MAX_DEPTH:
             self.fail(f"elements are nested more than {MAX_DEPTH} deep")
-        element = Element(tag, attributes, f"{self.path}:{self.parser.CurrentLineNumber}")
+        element = Element(tag, attributes, f"{self.name}:{self.parser.CurrentLineNumber}")
         self.open[-1].children.append(element)
         self.open.append(element)
 

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from clvol.scene.sensor import field_of_view_x
+
 if TYPE_CHECKING:
     from clvol.scene.records import Film, Perspective
 
@@ -43,22 +45,6 @@ class CameraRays:
     lens_y: np.ndarray
     lens_start: float
     lens_bend: float
-
-
-def field_of_view_x(sensor: Perspective, film: Film) -> float:
-    """Horizontal field of view in radians, from a field of view along any axis."""
-    aspect = film.width / film.height
-    axis = sensor.fov_axis
-    if axis == "smaller":
-        axis = "x" if film.width <= film.height else "y"
-    elif axis == "larger":
-        axis = "x" if film.width >= film.height else "y"
-    tangent = math.tan(math.radians(sensor.fov) / 2)
-    if axis == "y":
-        tangent *= aspect
-    elif axis == "diagonal":
-        tangent *= aspect / math.hypot(aspect, 1.0)
-    return 2 * math.atan(tangent)
 
 
 def camera_rays(sensor: Perspective, film: Film, centre: np.ndarray, radius: float) -> CameraRays:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
+
+import numpy as np
 
 from clvol.planning.plan import Plan
 from clvol.planning.refusals import refuse_fine_step
@@ -15,15 +16,15 @@ from clvol.scene.thinness import check_thinness
 from clvol.tables.apart import channels_apart, depth_across
 from clvol.tables.camera_medium import check_camera_medium
 from clvol.tables.majorants import Majorants, PreparedMajorant, choose_majorants
-from clvol.tables.surfaces import Surfaces, prepare_surfaces
+from clvol.tables.surfaces import Surfaces, prepare_surfaces, same_surface, with_looks
 from clvol.tables.volumes import PreparedVolume, check_cover, prepare_volume
 
 if TYPE_CHECKING:
-    import numpy as np
+    from collections.abc import Sequence
 
     from clvol.planning.needs import MajorantNeeds
     from clvol.scene.boundaries import Boundaries
-    from clvol.scene.records import Scene
+    from clvol.scene.records import GridVolume, Scene, Shape
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +85,9 @@ def prepare(scene: Scene, plan: Plan | None = None) -> PreparedScene:
         The marching step is too fine.
     """
     plan = plan or Plan.of(scene)
-    if scene not in _KEPT:
-        _KEPT[scene] = _Kept.of(scene, plan.boundaries)
-    kept = _KEPT[scene]
+    kept: _Kept | None = scene.kept.get(__name__)
+    if kept is None or not kept.fits(scene):
+        kept = scene.kept[__name__] = _Kept.of(scene, plan.boundaries, kept)
     refuse_fine_step(plan.choices.step, kept.radius)
     majorants = kept.majorants(plan.needs)
     settled = Settled(
@@ -105,9 +106,17 @@ def prepare(scene: Scene, plan: Plan | None = None) -> PreparedScene:
 class _Kept:
     """What is worked out about a scene, whatever is planned for it, and the majorants of its latest plan.
 
-    It holds neither samples of bricks nor the scene: a few hundredths of what the volumes take.
+    It holds no samples of bricks: a few hundredths of what the volumes take.
+
+    Parameters
+    ----------
+    shapes, others : what it was worked out from; the others are the sensor, the film and the emitters.
+    found : what bounds the media.
     """
 
+    shapes: tuple[Shape, ...]
+    others: tuple[object, ...]
+    found: Boundaries
     centre: np.ndarray
     radius: float
     surfaces: Surfaces | None
@@ -116,16 +125,36 @@ class _Kept:
     latest: tuple[MajorantNeeds, Majorants] | None = None
 
     @classmethod
-    def of(cls, scene: Scene, found: Boundaries) -> _Kept:
-        """Work it out, and check the scene."""
+    def of(cls, scene: Scene, found: Boundaries, before: _Kept | None) -> _Kept:
+        """Work it out, and check the scene; what has not changed since `before` is taken from there."""
         check_camera_medium(scene, found)
         check_thinness(scene, found)
         centre, radius = scene_sphere(scene, found)
         matter = number_matter([entry.medium for entry in found.entries])
         for medium in matter.media:
             check_cover(medium)
-        volumes = tuple(prepare_volume(volume, centre) for volume in matter.volumes)
-        return cls(centre, radius, prepare_surfaces(scene, found, centre), matter, volumes)
+        known = () if before is None else before.volumes
+        in_place = before is not None and np.array_equal(before.centre, centre)
+        volumes = tuple(_prepared_volume(volume, centre, known, in_place) for volume in matter.volumes)
+        surfaces = before.surfaces_of(scene, found) if before is not None and in_place else None
+        surfaces = surfaces or prepare_surfaces(scene, found, centre)
+        kept = cls(scene.shapes, _others(scene), found, centre, radius, surfaces, matter, volumes)
+        if before is not None and _same_objects(before.matter.media, matter.media):
+            same = before.matter.of_entry == matter.of_entry and _same_objects(before.volumes, volumes)
+            kept.latest = before.latest if same else None
+        return kept
+
+    def fits(self, scene: Scene) -> bool:
+        """Whether the scene is as it was."""
+        return _same_objects(self.shapes, scene.shapes) and _same_objects(self.others, _others(scene))
+
+    def surfaces_of(self, scene: Scene, found: Boundaries) -> Surfaces | None:
+        """The surfaces as they are, of what other materials and light; None where they are others."""
+        divided = self.found.surfaces == found.surfaces and self.found.boundaries == found.boundaries
+        pairs = [(self.shapes[n], scene.shapes[n]) for n in found.surfaces] if divided else []
+        if self.surfaces is None or not pairs or not all(same_surface(*pair) for pair in pairs):
+            return None
+        return with_looks(self.surfaces, [now for _, now in pairs])
 
     def majorants(self, needs: MajorantNeeds) -> Majorants:
         """Majorants that have what is needed of them."""
@@ -134,5 +163,22 @@ class _Kept:
         return self.latest[1]
 
 
-_KEPT: WeakKeyDictionary[Scene, _Kept] = WeakKeyDictionary()
-"""Of every scene that there still is: one that is rendered again has its tables."""
+def _others(scene: Scene) -> tuple[object, ...]:
+    return (scene.sensor, scene.film, *scene.emitters)
+
+
+def _prepared_volume(
+    volume: GridVolume, centre: np.ndarray, known: tuple[PreparedVolume, ...], in_place: bool
+) -> PreparedVolume:
+    """A volume's tables, or of its bricks what is `known`; `in_place`: the centre is the same."""
+    for one in known if in_place else ():
+        if one.volume is volume:
+            return one
+    for one in known:
+        if one.volume.grid is volume.grid and one.volume.wrap_mode == volume.wrap_mode:
+            return prepare_volume(volume, centre, one.bricks)
+    return prepare_volume(volume, centre)
+
+
+def _same_objects(some: Sequence[object], others: Sequence[object]) -> bool:
+    return len(some) == len(others) and all(one is other for one, other in zip(some, others, strict=True))

@@ -82,6 +82,22 @@ def prepare_surfaces(scene: records.Scene, found: Boundaries, centre: np.ndarray
     return Surfaces(shapes, table, *arrays, np.array(quadrics, layout.QUADRIC), hierarchy)
 
 
+def same_surface(one: records.Shape, other: records.Shape) -> bool:
+    """Whether two shapes lie alike in the hierarchy and hold their media alike, whatever they look like."""
+    return (
+        (one.kind, one.flip_normals, one.name) == (other.kind, other.flip_normals, other.name)
+        and (one.to_world is other.to_world and one.mesh is other.mesh)
+        and passes_light(one.bsdf) == passes_light(other.bsdf)
+        and is_transmissive(one.bsdf) == is_transmissive(other.bsdf)
+    )
+
+
+def with_looks(surfaces: Surfaces, shapes: list[records.Shape]) -> Surfaces:
+    """The same surfaces with the materials and the light of `shapes`."""
+    pairs = zip(surfaces.shapes, shapes, strict=True)
+    return replace(surfaces, shapes=[replace(s, bsdf=t.bsdf, emission=t.emission) for s, t in pairs])
+
+
 def _maps(shape: records.Shape, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """World from local and back, as 12 floats each, relative to the centre."""
     to_world = centred(shape.to_world, centre)

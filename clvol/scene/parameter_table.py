@@ -1,0 +1,244 @@
+"""What of a scene's records are parameters, what they are called, and what they may be.
+
+Names are those of ``mi.traverse``, as far as Mitsuba has the parameter; what it lacks follows its style.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from clvol.scene import materials, records
+from clvol.scene import parameter_values as values
+from clvol.scene.medium_facts import channels_of
+from clvol.scene.sensor import field_of_view_x
+from clvol.volumes.grid import DenseGrid
+
+if TYPE_CHECKING:
+    from clvol.scene.parameter_values import Check
+
+Put = Callable[[Any, Any], Any]
+"""A record and a value that was checked to the record with that value."""
+
+
+@dataclass(frozen=True, eq=False)
+class Parameter:
+    """One value of a scene.
+
+    Parameters
+    ----------
+    owner : the record that has it.  held : what is in it.
+    check : turns what a user gives into what `put` takes; an error for what it cannot be.
+    put : makes of the owner, which may have changed otherwise, one with such a value.
+    shown : turns what is held into what users see.
+    """
+
+    owner: Any
+    held: Any
+    check: Check
+    put: Put
+    shown: Callable[[Any], Any] = lambda held: held
+
+
+Found = Iterator[tuple[str, Parameter]]
+
+
+def parameters_of(scene: records.Scene) -> dict[str, Parameter]:
+    """Every parameter by name: of the sensors, the shapes and the emitters."""
+    found: dict[str, Parameter] = {}
+    taken: dict[str, int] = {}
+    seen: set[int] = set()
+    for kind, parts in (("sensor", scene.sensors), ("shape", scene.shapes), ("emitter", scene.emitters)):
+        for part in parts:
+            prefix = part.name or kind
+            taken[prefix] = taken.get(prefix, -1) + 1
+            prefix += f"_{taken[prefix]}" if taken[prefix] else ""
+            for name, parameter in _DESCRIBE[kind](part, seen):
+                found[f"{prefix}.{name}"] = parameter
+    return found
+
+
+def _field(owner: Any, name: str, check: Check, shown: Callable[[Any], Any] = lambda v: v) -> Parameter:
+    """A field of a record that is a parameter as it stands."""
+    return Parameter(owner, getattr(owner, name), check, lambda r, v: replace(r, **{name: v}), shown)
+
+
+def _colour(owner: Any, name: str, maximum: float) -> Parameter:
+    return _field(owner, name, values.colour(maximum), values.plain)
+
+
+def _sensor(sensor: records.Sensor, seen: set[int]) -> Found:
+    camera, film = sensor.camera, sensor.film
+    yield "to_world", _field(camera, "to_world", values.matrix(values.rigid), values.frozen)
+    x_fov = float(np.degrees(field_of_view_x(camera, film)))
+    degrees = values.number(0.0, 180.0, exclusive=True)
+    yield "x_fov", Parameter(camera, x_fov, degrees, lambda c, v: replace(c, fov=v, fov_axis="x"))
+    for name in ("near_clip", "far_clip"):
+        yield name, _field(camera, name, values.number(0.0, exclusive=True))
+    for axis, letter in enumerate("xy"):
+
+        def offset(c: Any, value: float, axis: int = axis) -> Any:
+            both = list(c.principal_point_offset)
+            both[axis] = value
+            return replace(c, principal_point_offset=tuple(both))
+
+        now = camera.principal_point_offset[axis]
+        yield f"principal_point_offset_{letter}", Parameter(camera, now, values.number(), offset)
+    yield "aperture_radius", _field(camera, "aperture_radius", values.number(0.0))
+    yield "focus_distance", _field(camera, "focus_distance", values.number(0.0, exclusive=True))
+    yield from _film(film)
+    if camera.medium is not None:
+        yield from _nested("medium", _medium(camera.medium, seen))
+
+
+def _film(film: records.Film) -> Found:
+    def resize(f: records.Film, size: tuple[int, int]) -> records.Film:
+        return replace(f, width=size[0], height=size[1])
+
+    def window(f: records.Film, first: int, pair: tuple[int, int]) -> records.Film:
+        crop = list(f.window)
+        crop[first : first + 2] = pair
+        whole = tuple(crop) == (0, 0, f.width, f.height)
+        return replace(f, crop=None if whole else (crop[0], crop[1], crop[2], crop[3]))
+
+    x, y, width, height = film.window
+    yield "film.size", Parameter(film, (film.width, film.height), values.pair(1), resize)
+    yield "film.crop_size", Parameter(film, (width, height), values.pair(1), lambda f, v: window(f, 2, v))
+    yield "film.crop_offset", Parameter(film, (x, y), values.pair(0), lambda f, v: window(f, 0, v))
+
+
+def _shape(shape: records.Shape, seen: set[int]) -> Found:
+    check = values.matrix(values.fits_shape(shape))
+    yield "to_world", _field(shape, "to_world", check, values.frozen)
+    if shape.emission is not None:
+        yield "emitter.radiance.value", _colour(shape, "emission", values.BRIGHTEST)
+    yield from _nested("bsdf", _bsdf(shape.bsdf, seen))
+    for side in ("interior", "exterior"):
+        if (medium := getattr(shape, side)) is not None:
+            yield from _nested(f"{side}_medium", _medium(medium, seen))
+
+
+def _nested(prefix: str, found: Found) -> Found:
+    return ((f"{prefix}.{name}", parameter) for name, parameter in found)
+
+
+def _medium(medium: records.Medium, seen: set[int]) -> Found:
+    """Of a medium that has not been seen: one that several shapes share goes by the first one's name."""
+    if id(medium) in seen:
+        return
+    seen.add(id(medium))
+    yield "scale", _colour(medium, "scale", np.inf)
+    for name, maximum in (("sigma_t", np.inf), ("albedo", 1.0), ("emission", np.inf)):
+        if getattr(medium, name) is not None:
+            yield from _nested(name, _volume(getattr(medium, name), maximum, signed=False))
+    if medium.emission is not None or medium.temperature is not None:
+        yield "emission_scale", _colour(medium, "emission_scale", values.BRIGHTEST)
+    if medium.temperature is not None:
+        yield from _nested("temperature", _volume(medium.temperature, np.inf, signed=True))
+        for name in ("temperature_scale", "temperature_offset"):
+            yield name, _field(medium, name, values.number())
+    yield from _nested("phase_function", _phase(medium, medium.phase, _put_phase))
+
+
+def _put_phase(medium: Any, phase: Any) -> Any:
+    return replace(medium, phase=phase)
+
+
+def _volume(volume: records.Volume, maximum: float, signed: bool) -> Found:
+    if isinstance(volume, records.ConstVolume):
+        check = values.kelvin() if signed else values.colour(maximum)
+        yield "value.value", _field(volume, "value", check, values.plain)
+    elif isinstance(volume.grid, DenseGrid):
+        check = values.samples(channels_of(volume), maximum, signed)
+        data = volume.grid.values if channels_of(volume) > 1 else volume.grid.values[..., 0]
+        yield "data", Parameter(volume, data, check, values.with_samples, values.frozen)
+
+
+def _phase(medium: Any, phase: records.PhaseFunction, put: Put, path: tuple[str, ...] = ()) -> Found:
+    """Of a phase function in a medium, which owns it: equal ones may be one object in several media."""
+
+    def inner(record: Any, **changes: Any) -> Any:
+        now = record.phase
+        for step in path:
+            now = getattr(now, step)
+        return put(record, replace(now, **changes))
+
+    if isinstance(phase, records.BlendPhase):
+        yield "weight", Parameter(medium, phase.weight, values.number(0, 1), lambda m, v: inner(m, weight=v))
+        for number, side in enumerate(("first", "second")):
+
+            def put_side(record: Any, changed: Any, side: str = side) -> Any:
+                return inner(record, **{side: changed})
+
+            parts = _phase(medium, getattr(phase, side), put_side, (*path, side))
+            yield from _nested(f"phase_{number}", parts)
+    elif phase.kind == "hg":
+        check = values.number(-1, 1, exclusive=True)
+        yield "g", Parameter(medium, phase.g, check, lambda m, v: inner(m, g=v))
+
+
+_BSDF_NUMBERS = {"alpha", "alpha_u", "alpha_v"}
+_COLOURS = {
+    "reflectance",
+    "diffuse_reflectance",
+    "specular_reflectance",
+    "specular_transmittance",
+    "opacity",
+    "color0",
+    "color1",
+}
+_NESTED = {"front": "brdf_0", "back": "brdf_1", "nested": "nested_bsdf"}
+
+
+def _bsdf(bsdf: Any, seen: set[int]) -> Found:
+    """Colours, textures, roughness and indices of a BSDF and of those inside it."""
+    if id(bsdf) in seen:
+        return
+    seen.add(id(bsdf))
+    for name in (field.name for field in fields(bsdf)):
+        value = getattr(bsdf, name)
+        if name in _NESTED:
+            yield from _nested(_NESTED[name], _bsdf(value, seen))
+        elif name in _BSDF_NUMBERS:
+            yield name, _field(bsdf, name, values.number(0.0))
+        elif name in ("int_ior", "ext_ior"):
+            yield name, _field(bsdf, name, values.number(0.0, exclusive=True))
+        elif name in ("eta", "k"):
+            yield f"{name}.value", _colour(bsdf, name, np.inf)
+        elif name in _COLOURS and isinstance(value, tuple):
+            yield f"{name}.value", _colour(bsdf, name, 1.0)
+        elif isinstance(value, materials.Checkerboard):
+            yield from _nested(name, _bsdf(value, seen))
+        elif isinstance(value, materials.Bitmap) and id(value) not in seen:
+            seen.add(id(value))
+            yield f"{name}.data", _field(value, "pixels", values.texels, values.frozen)
+
+
+def _emitter(emitter: records.Emitter, _seen: set[int]) -> Found:
+    match emitter:
+        case records.ConstantEmitter():
+            yield "radiance.value", _colour(emitter, "radiance", values.BRIGHTEST)
+        case records.EnvmapEmitter():
+            yield "data", _field(emitter, "radiance", values.environment, values.frozen)
+            yield "to_world", _field(emitter, "to_world", values.matrix(values.unstretched), values.frozen)
+        case records.DirectionalEmitter():
+            yield "irradiance.value", _colour(emitter, "irradiance", values.BRIGHTEST)
+            yield "direction", _field(emitter, "direction", values.direction)
+        case records.PointEmitter():
+            yield "intensity.value", _colour(emitter, "intensity", values.MOST_INTENSE)
+            yield "position", _field(emitter, "position", values.point)
+        case records.SpotEmitter():
+            yield "intensity.value", _colour(emitter, "intensity", values.MOST_INTENSE)
+            for name in ("cutoff_angle", "beam_width"):
+                yield name, _field(emitter, name, values.number(0.0, 180.0))
+            yield "to_world", _field(emitter, "to_world", values.matrix(values.unstretched), values.frozen)
+
+
+_DESCRIBE: dict[str, Callable[[Any, set[int]], Found]] = {
+    "sensor": _sensor,
+    "shape": _shape,
+    "emitter": _emitter,
+}
