@@ -12,10 +12,12 @@
 typedef float Spectrum;
 #define spectrum_max(s) abs_of(s)
 #define spectrum_mean(s) abs_of(s)
+#define spectrum_signed_mean(s) (s)
 #else
 typedef float3 Spectrum;
 #define spectrum_max(s) largest3(s)
 #define spectrum_mean(s) mean3(s)
+#define spectrum_signed_mean(s) (((s).x + (s).y + (s).z) * (1.0f / 3.0f))
 #endif
 
 #if CLVOL_EXTINCTION == 1

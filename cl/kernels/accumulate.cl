@@ -53,7 +53,7 @@ __kernel void accumulate_kernel(__global const float *results, __global float *f
 #if CLVOL_PATH_COUNTS
                                 __global ulong *film_counts,
 #endif
-#if CLVOL_FIRST_HIT
+#if CLVOL_FIRSTS
                                 __global const float *result_firsts, __global float *film_firsts,
 #endif
 #if CLVOL_PIXEL_LIST
@@ -93,7 +93,7 @@ __kernel void accumulate_kernel(__global const float *results, __global float *f
         add_samples(values, samples, first_sample, film + (size_t)pixel * (2 * FILM_PARTS * CLVOL_CHANNELS) + 2 * c);
     }
     film_peaks[(size_t)pixel * CLVOL_PEAKS] = peak;
-#if CLVOL_FIRST_HIT
+#if CLVOL_FIRSTS
     for (uint n = 0; n < CLVOL_FIRST_HIT_FIELDS; ++n) {
         const size_t at = (size_t)pixel * CLVOL_FIRST_HIT_FIELDS + n;
         float2 sum = vload2(at, film_firsts);

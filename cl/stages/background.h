@@ -14,7 +14,7 @@
 INLINE void expect_background(const Scene *scene, uint slot, float through, bool gets_through)
 {
     const Spectrum inside = to_spectrum(load_vector(scene->media->background), (int)path_channel(scene, slot));
-#if CLVOL_HAS_CONSTANT || CLVOL_HAS_ENVMAP
+#if CLVOL_HAS_CONSTANT || CLVOL_HAS_ENVMAP || CLVOL_HAS_BACKDROP
     const Spectrum behind = escape_light(scene, slot);
 #else
     const Spectrum behind = (Spectrum)(0.0f);
@@ -22,6 +22,9 @@ INLINE void expect_background(const Scene *scene, uint slot, float through, bool
     const float chance = through - (gets_through ? 1.0f : 0.0f);
     const Spectrum added = path_beta(scene, slot) * (behind - inside) * chance;
     set_path_radiance(scene, slot, path_radiance(scene, slot) + added);
+#if CLVOL_HAS_ALPHA
+    let_through(scene, slot, chance);
+#endif
 }
 
 #endif

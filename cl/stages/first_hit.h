@@ -25,11 +25,7 @@ INLINE float3 to_rgb(Spectrum s, int channel)
 INLINE void record_weighted(const Scene *scene, uint slot, float3 p, float3 normal, Spectrum albedo)
 {
     const Spectrum beta = path_beta(scene, slot) * path_sample_weight(scene, slot);
-#if CLVOL_SPECTRUM == 3
-    const float weight = (beta.x + beta.y + beta.z) * (1.0f / 3.0f);
-#else
-    const float weight = beta;
-#endif
+    const float weight = spectrum_signed_mean(beta);
     const float depth = length(p - load_vector(scene->render->camera_eye));
     set_path_depth(scene, slot, weight * depth);
     set_path_normal(scene, slot, weight * normal);

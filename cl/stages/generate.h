@@ -128,6 +128,7 @@ INLINE void start_job(const Scene *scene, uint slot, uint job, const Draws *draw
     set_path_albedo(scene, slot, (float3)(0.0f));
     set_path_position(scene, slot, (float3)(0.0f));
     set_path_met(scene, slot, 0.0f);
+    set_path_alpha(scene, slot, weight);
     reset_path(scene, slot);
 }
 

@@ -29,7 +29,7 @@ INLINE bool shade_begins(const Scene *scene, uint group, uint slot, Draws *draws
         return false;
     }
     if (event == EVENT_ESCAPE) {
-#if CLVOL_HAS_CONSTANT || CLVOL_HAS_ENVMAP
+#if CLVOL_HAS_CONSTANT || CLVOL_HAS_ENVMAP || CLVOL_HAS_ALPHA || CLVOL_HAS_BACKDROP
         shade_escape(scene, slot);
 #endif
         to_generate(scene, group, slot);

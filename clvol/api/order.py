@@ -46,6 +46,7 @@ class Order:
     choices : of them, and of the scene's own.
     piloted : a pilot is to choose technique, transmittance and majorant.
     first, count : samples of each pixel; `spp` is what was given instead.
+    transparent : the background was asked to be so.
     """
 
     scene: Scene
@@ -59,6 +60,7 @@ class Order:
     time_limit: float | None
     sensor: int | None
     size: tuple[int, int] | None
+    transparent: bool
     device: str | None
     pool: int | None
 
@@ -71,10 +73,14 @@ class Order:
         OptionError, SceneError
             Something that won't do, as far as can be told without a device.
         """
-        scene = viewed(check_scene(function, scene), given["sensor"], given["size"])
+        view = given["sensor"], given["size"]
+        scene = viewed(check_scene(function, scene), *view, given["background"])
         asked = {family: given[family] for family in registry.FAMILIES}
         for family, name in asked.items():
             registry.check_choice(family, name, pilot=True)
+        transparent = asked["background"] == registry.TRANSPARENT
+        if transparent:
+            asked["background"] = "auto"
         piloted = asked["technique"] == registry.PILOT
         if piloted:
             asked["technique"] = "auto"
@@ -88,8 +94,9 @@ class Order:
         first, count = _sample_range(scene, spp, time_limit, given["samples"])
         seed = check_seed(scene.seed if given["seed"] is None else given["seed"])
         extent = first, count, spp, seed, time_limit
-        view = given["sensor"], given["size"]
-        return cls(scene, asked, choices, piloted, *extent, *view, given["device"], given["pool"])
+        return cls(
+            scene, asked, choices, piloted, *extent, *view, transparent, given["device"], given["pool"]
+        )
 
     def open(self, callback: ProgressCallback | None, profiler: Profiler | None = None) -> Opened:
         """Plan it, and make it ready on the device; `callback` is told of a pilot."""
@@ -191,6 +198,8 @@ class Opened:
             given["samples"] = f"{order.first},{done}"
         else:
             given["spp"] = done
+        if order.transparent:
+            given["background"] = registry.TRANSPARENT
         size = None if order.size is None else "x".join(map(str, order.size))
         return given | {"sensor": order.sensor, "size": size, "seed": order.seed, "device": order.device}
 

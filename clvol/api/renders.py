@@ -74,7 +74,8 @@ def render(
         Names from `clvol.planning.registry`. "auto" takes the scene's own choice, else follows fixed rules,
         so that the same seed gives the same bits. Technique "auto:pilot" has a short measured pilot choose
         technique, transmittance and majorant, where they are left at "auto". ``result.metadata["repeat"]``
-        says what it chose.
+        says what it chose. Background "transparent" leaves out the environment behind all there is, which
+        still lights it: ``result.alpha`` says how much of a pixel is covered.
     sampler, shadow_cache, light_choice, next_event, lanes
         Names from there too.
     majorant_scale

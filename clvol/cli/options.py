@@ -20,8 +20,6 @@ else:
 F = TypeVar("F", bound="Callable[..., Any] | click.Command")
 """What an option is added to, and what comes of it."""
 
-PILOT_HELP = [("auto:pilot", "measures, then picks the technique, transmittance and majorant left at auto")]
-
 
 class RegistryChoice(_OptionType):
     """A name of one family of `clvol.planning.registry`, or "auto"; the registry is read when it is needed.
@@ -174,12 +172,14 @@ class ExplainedCommand(click.Command):
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write a section for each option that takes a name of the registry."""
+        from clvol.planning.registry import INSTEAD
+
         for parameter in self.params:
             if isinstance(parameter.type, RegistryChoice):
                 entries = parameter.type.entries()
-                automatic = PILOT_HELP if parameter.type.pilot and parameter.type.name == "technique" else []
+                instead = INSTEAD.get(parameter.type.name, {}) if parameter.type.pilot else {}
                 with formatter.section(parameter.opts[0]):
                     formatter.write_dl(
-                        [*automatic, *((name, entry.summary) for name, entry in entries.items())]
+                        [*instead.items(), *((name, entry.summary) for name, entry in entries.items())]
                     )
         super().format_epilog(ctx, formatter)

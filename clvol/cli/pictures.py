@@ -116,17 +116,11 @@ class Shown:
 
 
 def write_views(formatter: click.HelpFormatter) -> None:
-    """A section of --help: displays of the colour configuration and their views."""
-    from clvol.errors import Error
-    from clvol.picture.view_transform import config_name, views
-
+    """A section of --help on displays and views."""
     with formatter.section("--display, --view-transform"):
-        try:
-            formatter.write_dl([(display, "; ".join(known)) for display, known in views().items()])
-        except Error as error:
-            formatter.write_text(str(error))
-        else:
-            formatter.write_text(
-                f"Of {config_name()}, the first by default; parts of names will do. The environment variable "
-                "OCIO names another colour configuration."
-            )
+        formatter.write_text(
+            "Names, or parts of them, of the ACES configuration, or of the one that the environment variable "
+            "OCIO names. ACES has the displays sRGB (the default), 'Display P3', 'Rec.1886' and others, with "
+            "the views 'ACES 2.0' (the default, which keeps hues), 'Un-tone-mapped' (radiance up to 1 as it "
+            "is) and 'Raw'. The error of a name that there is not lists all."
+        )

@@ -63,7 +63,7 @@ class RenderCommand(ExplainedCommand):
     """As `ExplainedCommand`, and what AOVs, lights, qualities and views there are."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write a section of each before the rest."""
+        """Write a section of the pictures before the rest."""
         from clvol.planning.registry import AOVS
 
         with formatter.section("--aov"):

@@ -31,6 +31,7 @@ from clvol.layout.constants import (
     RANDOMIZATIONS,
 )
 from clvol.layout.path_state import (
+    ALPHA,
     COUNTS,
     FIRST_HIT,
     PATH_STATE,
@@ -67,6 +68,7 @@ from clvol.layout.stages import EVENTS, HANDLED, QUEUES, STAGES, launched, stage
 from clvol.layout.text import layout_text
 
 __all__ = [
+    "ALPHA",
     "ARGUMENTS",
     "BLACKBODY_BINS",
     "BLACKBODY_MIDDLE_KELVIN",

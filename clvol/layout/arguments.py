@@ -25,7 +25,7 @@ ARGUMENTS = (
     Argument("counters", "__global uint *"),
     Argument("results", "__global float *"),
     Argument("result_counts", "__global uint *", "CLVOL_RESULT_COUNTS"),
-    Argument("result_firsts", "__global float *", "CLVOL_FIRST_HIT"),
+    Argument("result_firsts", "__global float *", "CLVOL_FIRSTS"),
     Argument("pixel_list", "__global const uint *", "CLVOL_PIXEL_LIST"),  # pixel, its samples so far
     Argument("sobol", "__global const uint *", "CLVOL_RANDOMIZATIONS"),
     Argument("media", "__global const Medium *", "CLVOL_HAS_MEDIA"),

@@ -70,6 +70,8 @@ COUNTS = {
 
 FIRST_HIT = {"depth": 1, "normal": 3, "albedo": 3, "position": 3}
 """Pictures of what camera paths first meet, and the channels of each."""
+ALPHA = "alpha"
+"""The picture of how many camera paths meet something."""
 
 
 def _count(name: str, needs: str) -> Declared:
@@ -202,6 +204,7 @@ PATH_STATE: tuple[Declared, ...] = (
         (_NEE, _WALKS, "CLVOL_HAS_PASSABLE"),
     ),
     *(field for name in FIRST_HIT for field in _first_hit(name)),
+    Declared(ALPHA, "f", "1 less the weight with which the path has left unscattered", ("CLVOL_HAS_ALPHA",)),
     Declared("cut", "u", "statistics of the slot: paths ended by max_depth", ("CLVOL_HAS_MAX_DEPTH",)),
     Declared("cut_energy", "f", "statistics of the slot: weight of those paths", ("CLVOL_HAS_MAX_DEPTH",)),
     Declared("largest_weight", "f", "largest weight of the path or the slot", ("CLVOL_HAS_MEDIA",)),
@@ -213,7 +216,10 @@ PATH_STATE: tuple[Declared, ...] = (
 )
 """In the order in which a slot holds them."""
 _COUNTS = [declared for declared in PATH_STATE if declared.name in COUNTS]
-_FIRST_HITS = [declared for name in FIRST_HIT for declared in _first_hit(name)]
+_FIRST_HITS = [
+    *(declared for name in FIRST_HIT for declared in _first_hit(name)),
+    next(declared for declared in PATH_STATE if declared.name == ALPHA),
+]
 
 SLOT_STATISTICS: dict[str, Callable[..., Any]] = {
     "tentative": np.sum,
@@ -252,7 +258,7 @@ def counts_per_path(macros: Macros) -> int:
 
 
 def first_hit_fields(macros: Macros) -> list[str]:
-    """Fields kept per path for pictures of the first hit, in order."""
+    """Fields kept per path for pictures of the first hit and alpha, in order."""
     return [field.name for declared in _FIRST_HITS for field in declared.fields(macros)]
 
 

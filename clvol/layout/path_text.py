@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from clvol.layout.path_state import (
+    ALPHA,
     FIRST_HIT,
     PATH_STATE,
     Declared,
@@ -131,7 +132,7 @@ def _counts_text(macros: Macros) -> list[str]:
 def _first_hit_text(values: Mapping[str, Value]) -> str:
     """How what a path first met is written."""
     write, n = [], 0
-    for name in (*FIRST_HIT, "met"):
+    for name in (*FIRST_HIT, "met", ALPHA):
         if values[name].c_type == "float3" and values[name].rows:
             write.append(f"vstore3(path_{name}(scene, slot), 0, firsts + {n});")
         elif values[name].rows:

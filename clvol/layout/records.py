@@ -175,6 +175,7 @@ RENDER = _record(
     ("camera_base_dy", "f", 3),
     ("camera_forward", "f", 3),
     ("camera_far", "f", 1),  # depth of the far plane beyond the plane rays start from
+    ("backdrop", "f", 3),  # what is seen instead of the environment
     ("lens_x", "f", 3),  # radii of a thin lens, see `clvol.tables.camera`
     ("lens_y", "f", 3),
     ("lens_start", "f", 1),

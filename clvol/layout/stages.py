@@ -132,6 +132,7 @@ _RAY = "origin direction"
 _KEY = "pixel sample bounce"  # of random numbers
 _COUNTS = "lookups tentative real cells violations"  # of walks
 _FIRST_HIT = "depth normal albedo position met"
+_FIRSTS = f"{_FIRST_HIT} alpha"
 _HIT = "hit_t hit_primitive hit_u hit_v"
 _PASSED = "segment after_t after_primitive"
 _LEG = "leg walked walked_rest"
@@ -151,14 +152,14 @@ STAGES = (
             Transition("INTERSECT", "a job is left: a new path begins"),
             Transition(IDLE, "no job is left: the slot is empty until there are jobs again"),
         ),
-        reads=_fields("job radiance sample_weight largest_weight", _COUNTS, "shadow_rays", _FIRST_HIT),
+        reads=_fields("job radiance sample_weight largest_weight", _COUNTS, "shadow_rays", _FIRSTS),
         writes=_fields(
             _RAY,
             _KEY,
             _COUNTS,
             "shadow_rays",
             _PASSED,
-            _FIRST_HIT,
+            _FIRSTS,
             "job beta radiance sample_weight channel pdf inside eta_squared largest_weight",
         ),
         wakes="wake_idle",
@@ -204,9 +205,9 @@ STAGES = (
             _LEG,
             _LANES,
             "event channel beta radiance pdf inside segment after_t hit_t medium_end",
-            "largest_weight exhausted",
+            "largest_weight exhausted alpha sample_weight",
         ),
-        writes=_fields(_COUNTS, _LEG, _LANES, "origin medium beta radiance largest_weight exhausted"),
+        writes=_fields(_COUNTS, _LEG, _LANES, "origin medium beta radiance largest_weight exhausted alpha"),
         needs="CLVOL_HAS_MEDIA",
         stands_by="WALK",
     ),
@@ -237,13 +238,13 @@ STAGES = (
             _KEY,
             _HIT,
             "event goes_on channel beta radiance pdf medium segment inside eta_squared sample_weight",
-            "largest_weight cut cut_energy exhausted shadow_rays",
+            "largest_weight cut cut_energy exhausted shadow_rays alpha",
         ),
         writes=_fields(
             _RAY,
             _PASSED,
             _SHADOW_RAY,
-            _FIRST_HIT,
+            _FIRSTS,
             "bounce beta radiance pdf inside eta_squared",
             "largest_weight cut cut_energy exhausted shadow_rays",
         ),

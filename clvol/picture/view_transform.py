@@ -65,14 +65,6 @@ def config_name() -> str:
     return os.environ.get("OCIO") or BUILT_IN
 
 
-def views() -> dict[str, tuple[str, ...]]:
-    """Displays of the colour configuration with their views, the default ones first."""
-    config = _config(config_name())
-    first = config.getDefaultDisplayName()
-    displays = sorted(config.getDisplayNames(), key=lambda name: name != first)
-    return {display: tuple(config.getViewNames(display)) for display in displays}
-
-
 def through_view(image: np.ndarray, view: View) -> np.ndarray:
     """Linear radiance (h, w, 3) as a display shows it, float32 from 0 to 1; no NaN may be in it.
 

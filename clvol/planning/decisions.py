@@ -211,6 +211,17 @@ class Decisions:
         return tuple(name for name in registry.FIRST_HIT if name in self.choices.aov)
 
     @property
+    def opaque(self) -> bool:
+        """Alpha is 1 everywhere, as in Mitsuba: something is seen behind all there is."""
+        f = self.features
+        return f.backdrop or ((f.constant or f.envmap) and not f.hide_environment)
+
+    @property
+    def counts_alpha(self) -> bool:
+        """Paths that leave unscattered are counted."""
+        return self.features.alpha and not self.opaque
+
+    @property
     def shown(self) -> frozenset[str]:
         """Pictures whose numbers are kept: those asked for, look-ups, and what others are made from."""
         of = {"null": ("tentative", "real"), "efficiency": ("cells",)}

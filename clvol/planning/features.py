@@ -75,6 +75,9 @@ class Features:
     lens: bool = False
     depth_limited: bool = False
     hide_emitters: bool = False
+    hide_environment: bool = False
+    backdrop: bool = False
+    alpha: bool = False
 
     @property
     def area(self) -> bool:

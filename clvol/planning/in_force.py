@@ -119,6 +119,11 @@ def warnings(plan: Decisions, asked: Mapping[str, str]) -> Iterator[str]:
         yield "majorant_scale is not used: nothing in this render walks a majorant"
     if not features.emitters and not features.emission:
         yield "the scene has no emitter: its picture is black"
+    if features.alpha and plan.opaque:
+        yield (
+            "alpha is 1 everywhere, since the environment is seen: hide_emitters or background transparent "
+            "leave it out"
+        )
     if plan.settled is not None and plan.mixes_far_channels:
         yield (
             f"extinctions of the channels differ by 1 : {plan.settled.channels_apart:.2g}, and technique "

@@ -55,6 +55,9 @@ def find_features(scene: records.Scene, found: Boundaries) -> Features:
         lens=scene.sensor.aperture_radius > 0,
         depth_limited=scene.integrator.max_depth >= 0,
         hide_emitters=scene.integrator.hide_emitters,
+        hide_environment=scene.integrator.hide_emitters or scene.film.backdrop is not None,
+        backdrop=any(scene.film.backdrop or ()),
+        alpha=scene.film.has_alpha,
     )
 
 
@@ -148,7 +151,7 @@ def _light_features(
     sampled = any(m.sample_emitters for m in media) or bool(surfaces)
     return {
         "emitters": len(scene.emitters) + len(lamps),
-        "chromatic_light": not grey,
+        "chromatic_light": not grey or len(set(scene.film.backdrop or ())) > 1,
         **dict.fromkeys(kinds, True),
         "samples_lights": bool(scene.emitters or lamps) and sampled,
     }

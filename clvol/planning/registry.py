@@ -261,9 +261,18 @@ PILOT = "auto:pilot"
 """The technique that has a measured pilot choose technique, transmittance and majorant."""
 
 
+TRANSPARENT = "transparent"
+"""The background that is not there (`clvol.scene.views.before`)."""
+INSTEAD = {
+    "technique": {PILOT: "measures, then picks the technique, transmittance and majorant left at auto"},
+    "background": {TRANSPARENT: "no environment is seen, and the picture has alpha"},
+}
+"""What a user may ask a render for instead of a choice, by family; with what it does."""
+
+
 def automatic(family: str) -> list[str]:
     """What a user may say instead of a choice of `family`."""
-    return ["auto", PILOT] if family == "technique" else ["auto"]
+    return ["auto", *INSTEAD.get(family, ())]
 
 
 def check_choice(family: str, value: str, pilot: bool = False) -> str:

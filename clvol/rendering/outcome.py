@@ -72,6 +72,7 @@ def _metadata(session: Session, first: int, samples: np.ndarray) -> dict[str, An
         **({"majorant_scale": scale} if scale != 1 else {}),
         **({"biased": ", ".join(biased), "step": plan.choices.step or "voxel"} if biased else {}),
         **({"channels_apart": f"1 : {apart:.3g}"} if apart else {}),
+        **({"pixel_format": scene.film.pixel_format} if scene.film.has_alpha else {}),
         "spp": int(samples[0]) if even else round(float(samples.mean()), 3),
         **said_ranges(((first, int(samples.max())),)),
         "seed": session.seed,
@@ -87,8 +88,11 @@ def _pictures(session: Session, samples: np.ndarray, estimate: Estimate) -> dict
     sums, peaks, nothing = film.counts(), film.peaks_by_pixel(), np.zeros(film.pixels)
     counts = {name: total / np.maximum(samples, 1) for name, total in sums.items()}
     found = {}
-    for name in dict.fromkeys(("lookups", *plan.choices.aov, *(["samples"] if plan.pixel_list else []))):
-        if name in registry.FIRST_HIT:
+    more = [layout.ALPHA] * plan.features.alpha + ["samples"] * plan.pixel_list
+    for name in dict.fromkeys(("lookups", *plan.choices.aov, *more)):
+        if name == layout.ALPHA:
+            values = _alpha(session, np.maximum(samples, 1) * plan.jobs_per_sample)
+        elif name in registry.FIRST_HIT:
             values = _first_hit(session, name, np.maximum(samples, 1) * plan.jobs_per_sample)
         elif name == "largest_weight":
             values = peaks.get(name, np.ones(film.pixels))
@@ -140,6 +144,14 @@ def _first_hit(session: Session, name: str, paths: np.ndarray) -> np.ndarray:
     if name == "position":  # the device's are relative to the centre
         means += (sums["met"] / paths)[:, None] * session.prepared.centre
     return means if channels > 1 else means[:, 0]
+
+
+def _alpha(session: Session, paths: np.ndarray) -> np.ndarray:
+    """The share of `paths` paths that met something; 1 where an environment is seen behind all else."""
+    if session.plan.opaque:
+        return np.ones(session.wavefront.film.pixels)
+    alpha: np.ndarray = session.wavefront.film.first_hits()[layout.ALPHA] / paths
+    return alpha
 
 
 def statistics(session: Session, samples: int) -> dict[str, Any]:

@@ -25,6 +25,7 @@ from clvol.rendering.upload import upload_scene
 from clvol.rendering.wavefront import Pool, Wavefront
 from clvol.scene.digest import scene_digest
 from clvol.tables.camera import camera_rays
+from clvol.tables.colours import rgb
 from clvol.tables.light_cache import light_cache_record
 from clvol.tables.pixel_filter import FILTER_BINS
 from clvol.tables.prepare import PreparedScene, prepare
@@ -254,6 +255,7 @@ def render_record(prepared: PreparedScene, seed: int) -> np.ndarray:
         record["triangles"] = len(prepared.surfaces.faces)
     record["filter_radius"] = scene.film.rfilter.radius
     record["filter_bins"] = FILTER_BINS
+    record["backdrop"] = rgb(scene.film.backdrop or (0.0,))
     record["sample_border"] = int(scene.film.sample_border)
     everywhere = any(entry.everywhere for entry in prepared.boundaries.entries)
     reach = np.inf if everywhere else prepared.radius  # of what a ray can meet

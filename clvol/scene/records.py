@@ -54,6 +54,7 @@ class Film:
 
     `crop` (x, y, width, height): the part of it that is rendered; None: all.
     `pixel_format`: "rgb", or "rgba" for a picture with alpha.
+    `backdrop`: radiance that is seen instead of the environment behind all there is; None: the environment.
     `component_format`: what colours are in files that hold such, "float16" or "float32"; None: what is usual.
     """
 
@@ -63,6 +64,7 @@ class Film:
     sample_border: bool = False
     crop: tuple[int, int, int, int] | None = None
     pixel_format: str = "rgb"
+    backdrop: Spectrum | None = None
     component_format: str | None = None
 
     @property

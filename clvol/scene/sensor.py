@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from clvol.scene.reader import BRIGHTEST
 from clvol.scene.records import Film, Perspective, ReconstructionFilter, Sampler, Sensor
 
 if TYPE_CHECKING:
@@ -124,12 +125,6 @@ def hdrfilm(reader: Reader) -> Film:
     height = reader.integer("height", Film.height, 1, MAX_SIDE)
     if fault := film_fault(width, height):
         reader.fail(fault, "width", f"at most {MAX_PIXELS} pixels")
-    if reader.has("pixel_format") and reader.string("pixel_format", "rgb") != "rgb":
-        reader.fail(
-            f"pixel_format '{reader.string('pixel_format', 'rgb')}' is not supported in this version",
-            "pixel_format",
-            "supported: rgb",
-        )
     component_format = None
     if reader.has("component_format"):
         component_format = reader.string("component_format", "float32", ("float16", "float32"))
@@ -142,7 +137,8 @@ def hdrfilm(reader: Reader) -> Film:
         reader.boolean("sample_border", False),
         _crop(reader, width, height),
         reader.string("pixel_format", Film.pixel_format, ("rgb", "rgba")),
-        component_format,
+        reader.color("backdrop", 0.0, light=True, maximum=BRIGHTEST) if reader.has("backdrop") else None,
+        component_format=component_format,
     )
 
 

@@ -1,24 +1,31 @@
-"""A scene seen otherwise: by another of its sensors, or in another size."""
+"""A scene seen otherwise: by another of its sensors, in another size, or before another background."""
 
 from __future__ import annotations
 
 import operator
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from clvol.errors import OptionError, shown
 from clvol.scene.sensor import film_fault
 
 TRANSPARENT = "transparent"
+"""The background of a picture with alpha."""
 
 if TYPE_CHECKING:
-    from clvol.scene.records import Scene
+    from clvol.scene.records import Scene, Spectrum
 
 
-def viewed(scene: Scene, sensor: int | None = None, size: tuple[int, int] | None = None) -> Scene:
-    """The scene `seen_by` a sensor and `in_size`, where these are given."""
+def viewed(
+    scene: Scene,
+    sensor: int | None = None,
+    size: tuple[int, int] | None = None,
+    background: str = "auto",
+) -> Scene:
+    """The scene `seen_by` a sensor, `in_size`, and `before` a transparent background, where asked for."""
     scene = scene if sensor is None else seen_by(scene, sensor)
-    return scene if size is None else in_size(scene, size)
+    scene = scene if size is None else in_size(scene, size)
+    return before(scene, background) if background == TRANSPARENT else scene
 
 
 def seen_by(scene: Scene, sensor: int) -> Scene:
@@ -51,15 +58,15 @@ def in_size(scene: Scene, size: tuple[int, int]) -> Scene:
     return replace(scene, film=replace(scene.film, width=width, height=height))
 
 
-def before(scene: Scene, background: str | tuple[float, ...]) -> Scene:
-    """The scene before a background of its own, which lights nothing, instead of the lights behind it.
+def before(scene: Scene, background: str | Spectrum) -> Scene:
+    """The scene before a background of its own, which lights nothing, instead of the environment.
 
-    background : linear radiance, one number or three; or "transparent", of a picture with alpha.
+    background : linear radiance, one number or three; or "transparent", of a picture with alpha.  The
+        environment still lights the scene.
     """
-    integrator = replace(scene.integrator, hide_emitters=True)
     if background == TRANSPARENT:
-        return replace(scene, film=replace(scene.film, pixel_format="rgba"), integrator=integrator)
-    return replace(scene, integrator=integrator)
+        return replace(scene, film=replace(scene.film, pixel_format="rgba", backdrop=(0.0,)))
+    return replace(scene, film=replace(scene.film, backdrop=cast("Spectrum", background)))
 
 
 def check_size(size: tuple[int, int]) -> tuple[int, int]:

@@ -105,10 +105,7 @@ def colour(name: str, value: Any) -> tuple[float, ...]:
 
 def background(name: str, value: Any) -> str | tuple[float, ...]:
     """A colour, or "transparent"."""
-    found = TRANSPARENT if value == TRANSPARENT else colour(name, value)
-    if found != (0.0,):
-        raise OptionError(f"{name} other than black is not supported in this version")
-    return found
+    return TRANSPARENT if value == TRANSPARENT else colour(name, value)
 
 
 def direction(name: str, value: Any) -> tuple[float, ...]:

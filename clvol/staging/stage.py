@@ -16,7 +16,7 @@ from clvol.staging.framing import FOV, Axes, View, frame, revolved
 from clvol.staging.lights import environment_file, look_emitters
 from clvol.staging.looks import LOOKS
 from clvol.staging.medium import ALBEDO, DARK, Grids, Scales, choose_scales, medium
-from clvol.staging.options import OPTIONS, VIEWS, checked
+from clvol.staging.options import OPTIONS, TRANSPARENT, VIEWS, checked
 from clvol.staging.said import said
 from clvol.staging.source import Field, Source
 from clvol.staging.thickness import Rays
@@ -116,11 +116,11 @@ def stage(
     if fixed.scales is None:
         fixed = replace(fixed, scales=choose_scales(grids, options, rays, fixed.peak))
     assert fixed.scales is not None
-    hidden = {} if options.background is None else {"hide_emitters": True}
+    hidden = {"hide_emitters": True} if options.background == TRANSPARENT else {}
     description: dict[str, Any] = {
         "type": "scene",
         "integrator": {"type": "volpath", "max_depth": MAX_DEPTH, "rr_depth": RR_DEPTH, **hidden},
-        "sensor": sensor(view, fixed.box, size, spp),
+        "sensor": sensor(view, fixed.box, size, spp, options.background),
         **lights(options, axes, view.azimuth, DIMMED if fixed.burns else 1.0),
         **({"floor": floor(fixed.box, axes)} if options.ground else {}),
     }
@@ -165,8 +165,24 @@ def shown_points(grids: Grids) -> np.ndarray:
     return grids.density.outermost()
 
 
-def sensor(view: View, box: np.ndarray, size: tuple[int, int], spp: int) -> dict[str, Any]:
+def sensor(
+    view: View,
+    box: np.ndarray,
+    size: tuple[int, int],
+    spp: int,
+    background: str | tuple[float, ...] | None,
+) -> dict[str, Any]:
     """The camera's plugin with its film."""
+    film: dict[str, Any] = {
+        "type": "hdrfilm",
+        "width": size[0],
+        "height": size[1],
+        "rfilter": {"type": "box"},
+    }
+    if background == TRANSPARENT:
+        film["pixel_format"] = "rgba"
+    elif background is not None:
+        film["backdrop"] = {"type": "rgb", "value": list(np.broadcast_to(np.asarray(background), 3))}
     reach = view.distance + float(np.linalg.norm(box[1] - box[0]))
     return {
         "type": "perspective",
@@ -175,7 +191,7 @@ def sensor(view: View, box: np.ndarray, size: tuple[int, int], spp: int) -> dict
         "near_clip": 1e-3 * reach,
         "far_clip": 1e3 * reach,
         "to_world": view.to_world,
-        "film": {"type": "hdrfilm", "width": size[0], "height": size[1], "rfilter": {"type": "box"}},
+        "film": film,
         "sampler": {"type": "independent", "sample_count": spp},
     }
 

@@ -21,6 +21,7 @@ from clvol.planning.choices import Choices
 from clvol.planning.plan import Plan
 from clvol.rendering import wavefront
 from clvol.rendering.session import Session, on_device
+from clvol.scene.views import TRANSPARENT, before
 from clvol.tables.prepare import prepare
 
 NAMES = [stage.name for stage in STAGES]
@@ -110,7 +111,8 @@ SENSOR = {
 
 def scene(**what):
     integrator = {"type": "volpath", "max_depth": 6}
-    return clvol.load_dict({"type": "scene", "integrator": integrator, "sensor": SENSOR, **what})
+    described = {"type": "scene", "integrator": integrator, "sensor": SENSOR, **what}
+    return before(clvol.load_dict(described), TRANSPARENT)
 
 
 def cube(medium, **what):

@@ -191,7 +191,7 @@ def test_a_crop_is_a_window_of_the_film():
         ({"film": {"type": "hdrfilm", "crop_offset_y": 1}}, "crop_offset_y: the crop window reaches beyond"),
         ({"film": {"type": "hdrfilm", "crop_height": 0}}, "from 1 to"),
         ({"film": {"type": "hdrfilm", "crop_offset_x": -1}}, "from 0 to"),
-        ({"film": {"type": "hdrfilm", "pixel_format": "rgba"}}, "'rgba' is not supported"),
+        ({"film": {"type": "hdrfilm", "pixel_format": "xyz"}}, "rgb, rgba"),
         (
             {"film": {"type": "hdrfilm", "rfilter": {"type": "mitchell", "B": 1.5}}},
             "'B' of rfilter 'mitchell' must be in [0, 1]",

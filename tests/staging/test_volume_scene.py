@@ -90,7 +90,7 @@ def test_a_floor_is_below_and_glowing_smoke_is_written_too(tmp_path: Path) -> No
     assert outcome.exit_code == 0, outcome.output
     written = clvol.load_file(tmp_path / "fire.xml")
     made = clvol.volume_scene(FIRE, ground=True, background="black")
-    assert written.integrator.hide_emitters and made.integrator.hide_emitters
+    assert written.film.backdrop == (0.0,) and made.film.backdrop == (0.0,)
     for scene in (written, made):
         floor, volume = scene.shapes
         assert floor.kind == "disk" and volume.interior.emits
