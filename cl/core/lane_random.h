@@ -68,11 +68,11 @@ DEFINE_MINUS_LOG(lane_minus_log, Real)
 INLINE Real lane_exponential(Bits k)
 {
     const Int lower_half = MASK(bits_int(k) >= 0);
-    const Real tail = to_real(bits_int(lower_half ? k : ~k)) * 0x1p-32f + 0x1p-33f;
+    const Real tail = to_real(bits_int(either_bits(lower_half, k, ~k))) * 0x1p-32f + 0x1p-33f;
     const Int near_one = lower_half & MASK(tail < 0.29f);
-    const Bits shifted = real_bits(lower_half ? 1.0f - tail : tail) - 0x3F3504F3u;
-    const Real exponent = near_one ? (Real)(0.0f) : to_real(bits_int(shifted) >> 23);
-    const Real r = near_one ? -tail : bits_real((shifted & 0x007FFFFFu) + 0x3F3504F3u) - 1.0f;
+    const Bits shifted = real_bits(either(lower_half, 1.0f - tail, tail)) - 0x3F3504F3u;
+    const Real exponent = either(near_one, (Real)(0.0f), to_real(bits_int(shifted) >> 23));
+    const Real r = either(near_one, -tail, bits_real((shifted & 0x007FFFFFu) + 0x3F3504F3u) - 1.0f);
     return lane_minus_log(r, exponent);
 }
 
@@ -80,8 +80,8 @@ INLINE Real lane_exponential(Bits k)
 INLINE Int lane_chooses(Bits k, Real part, Real rest)
 {
     const Int rare = MASK(part <= rest);
-    const Int happened = MASK(lane_uniform(k) * (part + rest) < (rare ? part : rest));
-    return rare ? happened : ~happened;
+    const Int happened = MASK(lane_uniform(k) * (part + rest) < either(rare, part, rest));
+    return happened ^ ~rare;
 }
 
 #endif

@@ -1,7 +1,7 @@
 /* Walks side by side: numbers of CLVOL_LANES walks at once, one in each lane of a vector, or of one walk.
 
    Where all is one walk the names stand for scalars, so that what is written once computes the same bits at every
-   width.  A mask holds all ones where it holds, else 0, and masks combine by & | ~; a ? b : c takes one.  Only plain
+   width.  A mask holds all ones where it holds, else 0, and masks combine by & | ~ ^; either() takes one.  Only plain
    operators: PoCL calls its library for the built-in functions of vectors, lane by lane. */
 #ifndef CLVOL_CORE_LANES_H
 #define CLVOL_CORE_LANES_H
@@ -88,32 +88,42 @@ INLINE Bits high_product(Bits x, uint factor)
 }
 #endif
 
+/* a where a mask holds, b elsewhere: bit by bit, since of a vector's ?: compilers make masks of other widths. */
+INLINE Int either_int(Int mask, Int a, Int b) { return (mask & a) | (~mask & b); }
+INLINE Bits either_bits(Int mask, Bits a, Bits b) { return (int_bits(mask) & a) | (~int_bits(mask) & b); }
+INLINE Real either(Int mask, Real a, Real b) { return bits_real(either_bits(mask, real_bits(a), real_bits(b))); }
+
 /* NaN-free arguments only. */
 INLINE Real least_of(Real a, Real b) { return a < b ? a : b; }
 INLINE Real greatest_of(Real a, Real b) { return a > b ? a : b; }
 INLINE Int least_int(Int a, Int b) { return a < b ? a : b; }
 INLINE Real between(Real a, Real b, Real t) { return (b - a) * t + a; }
 
-/* The lanes in which a mask holds, a bit each. */
-INLINE uint lanes_of(Int mask)
+/* The lanes in which masks hold, a bit each: those of one in the lower half of the bits, of another in the upper. */
+INLINE uint lanes_of_two(Int lower, Int upper)
 {
 #if CLVOL_LANES == 1
-    return (uint)mask & 1u;
+    return ((uint)lower & 1u) | ((uint)upper & 0x10000u);
 #else
 #if CLVOL_LANES == 16
-    const int16 own = mask & (int16)(1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16384, 32768);
+    const int16 bits = (int16)(1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16384, 32768);
+    const int16 own = (lower & bits) | (upper & (bits << 16));
     const int8 eight = own.lo | own.hi;
     const int4 four = eight.lo | eight.hi;
 #elif CLVOL_LANES == 8
-    const int8 own = mask & (int8)(1, 2, 4, 8, 16, 32, 64, 128);
+    const int8 bits = (int8)(1, 2, 4, 8, 16, 32, 64, 128);
+    const int8 own = (lower & bits) | (upper & (bits << 16));
     const int4 four = own.lo | own.hi;
 #else
-    const int4 four = mask & (int4)(1, 2, 4, 8);
+    const int4 bits = (int4)(1, 2, 4, 8);
+    const int4 four = (lower & bits) | (upper & (bits << 16));
 #endif
     const int2 two = four.lo | four.hi;
     return (uint)(two.x | two.y);
 #endif
 }
+
+INLINE uint lanes_of(Int mask) { return lanes_of_two(mask, (Int)(0)); }
 
 #define ALL_LANES ((1u << CLVOL_LANES) - 1u)
 

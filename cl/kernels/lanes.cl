@@ -85,8 +85,8 @@ INLINE void lane_enter(const LaneCells *cells, const LaneRays *rays, LaneState *
     const Int z = lane_axis_cell_of(cells, size[2], rays->o_z, rays->d_z, t);
     const Real found = gather_real(cells->majorants, (z * size[1] + y) * size[0] + x);
     const Int empty = MASK(found < 0.0f);
-    const Int edge = empty ? to_int(-found) : (Int)(1);
-    const Real bound = empty ? (Real)(0.0f) : found;
+    const Int edge = either_int(empty, to_int(-found), (Int)(1));
+    const Real bound = either(empty, (Real)(0.0f), found);
     const Real t_x = lane_axis_exit(cells, size[0], rays->o_x, rays->d_x, rays->inverse_x, x, edge);
     const Real t_y = lane_axis_exit(cells, size[1], rays->o_y, rays->d_y, rays->inverse_y, y, edge);
     const Real t_z = lane_axis_exit(cells, size[2], rays->o_z, rays->d_z, rays->inverse_z, z, edge);
@@ -96,8 +96,8 @@ INLINE void lane_enter(const LaneCells *cells, const LaneRays *rays, LaneState *
 #else
     const Real bound = (Real)(cells->bound), t_end = rays->t_max;
 #endif
-    state->t_end = advance ? t_end : state->t_end;
-    state->bound = advance ? bound : state->bound;
+    state->t_end = either(advance, t_end, state->t_end);
+    state->bound = either(advance, bound, state->bound);
     state->cells -= advance;
 }
 
@@ -202,15 +202,16 @@ INLINE LanesWalked walk_lanes(const Scene *scene, uint group, __global const uin
         for (;;) {
             const Real left = (state.t_end - state.t) * state.bound;
             ready = state.alive & MASK(state.depth < left);
-            waiting = lane_count(lanes_of(ready));
-            Int advance = state.alive & ~ready;
-            const uint advancing = lane_count(lanes_of(advance));
+            const Int advance = state.alive & ~ready;
+            const uint both = lanes_of_two(ready, advance);
+            waiting = lane_count(both & ALL_LANES);
+            const uint advancing = lane_count(both >> 16);
             if (waiting >= LANES_WAITING || advancing == 0)
                 break;
             walked.lane_steps += CLVOL_LANES;
             walked.busy_steps += advancing;
-            state.depth -= advance ? left : (Real)(0.0f);
-            state.t = advance ? state.t_end : state.t;
+            state.depth -= either(advance, left, (Real)(0.0f));
+            state.t = either(advance, state.t_end, state.t);
             state.alive &= ~(advance & MASK(state.t >= rays.t_max));
             lane_enter(&cells, &rays, &state, advance & state.alive);
         }
@@ -218,7 +219,7 @@ INLINE LanesWalked walk_lanes(const Scene *scene, uint group, __global const uin
             continue;
         walked.lane_steps += CLVOL_LANES;
         walked.busy_steps += waiting;
-        state.t += ready ? state.depth / state.bound : (Real)(0.0f);
+        state.t += either(ready, state.depth / state.bound, (Real)(0.0f));
         state.lookups -= ready;
         const Real x = rays.o_x + state.t * rays.d_x, y = rays.o_y + state.t * rays.d_y;
         const Real z = rays.o_z + state.t * rays.d_z;
@@ -226,7 +227,7 @@ INLINE LanesWalked walk_lanes(const Scene *scene, uint group, __global const uin
         state.violations -= ready & MASK(found > state.bound);
         const BitsPair k = lane_pair(&state.stream, ready);
         const Int ended = lane_event(&state, found, k.x, ready);
-        state.depth = ready ? lane_exponential(k.y) * rays.per_depth : state.depth;
+        state.depth = either(ready, lane_exponential(k.y) * rays.per_depth, state.depth);
         state.happened |= LANE_FLIES_ON ? none : ended;
         state.alive &= ~ended & ~(ready & MASK(state.lookups >= (int)WALK_STEPS));
     }

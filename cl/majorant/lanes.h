@@ -41,7 +41,7 @@ INLINE LaneCells lane_cells(const Scene *scene, __global const Medium *medium)
 INLINE Int lane_axis_cell_of(const LaneCells *lanes, int cells, Real o, Real d, Real t)
 {
     const Int forward = MASK(d > 0.0f);
-    const Real p = (o + t * d + (forward ? (Real)(LANE_NUDGE) : (Real)(-LANE_NUDGE))) * lanes->scale;
+    const Real p = (o + t * d + either(forward, (Real)(LANE_NUDGE), (Real)(-LANE_NUDGE))) * lanes->scale;
     return to_int(least_of(greatest_of(p, (Real)(0.0f)), (Real)((float)(cells - 1))));
 }
 
@@ -50,9 +50,9 @@ INLINE Int lane_axis_cell_of(const LaneCells *lanes, int cells, Real o, Real d, 
 INLINE Real lane_axis_exit(const LaneCells *lanes, int cells, Real o, Real d, Real inverse_d, Int cell, Int edge)
 {
     const Int forward = MASK(d > 0.0f);
-    const Int plane = (cell & -edge) + (forward & edge);
-    const Real t = (to_real(plane) * lanes->cell_size - o) * inverse_d;
-    return (forward ? MASK(plane >= cells) : MASK(plane <= 0)) ? (Real)(INFINITY) : t;
+    const Int plane = least_int((cell & -edge) + (forward & edge), (Int)(cells));
+    const Int outer = MASK(plane == (forward & cells));
+    return either(outer, (Real)(INFINITY), (to_real(plane) * lanes->cell_size - o) * inverse_d);
 }
 
 #endif

@@ -45,9 +45,9 @@ INLINE Int lane_event(LaneState *state, Real density, Bits k, Int ready)
     const Real through = state->estimate * ((state->bound - density) / state->bound);
     const Int small = ready & before & MASK(through < TRANSMITTANCE_ROULETTE);
     const Int lost = small & ~MASK(lane_uniform(k) * TRANSMITTANCE_ROULETTE < through);
-    const Real kept = small ? (lost ? (Real)(0.0f) : (Real)(TRANSMITTANCE_ROULETTE)) : through;
-    state->estimate = ready ? kept : state->estimate;
-    state->met = collides ? state->t : state->met;
+    const Real kept = either(small, either(lost, (Real)(0.0f), (Real)(TRANSMITTANCE_ROULETTE)), through);
+    state->estimate = either(ready, kept, state->estimate);
+    state->met = either(collides, state->t, state->met);
     state->happened |= collides;
     return lost;
 }

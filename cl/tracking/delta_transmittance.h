@@ -36,7 +36,7 @@ INLINE Extinction estimate_transmittance(const MediumRay *in, uint first, Stream
 INLINE Int lane_event(LaneState *state, Real density, Bits k, Int ready)
 {
     const Int real = ready & lane_chooses(k, density, state->bound - density);
-    state->estimate = real ? (Real)(0.0f) : state->estimate;
+    state->estimate = either(real, (Real)(0.0f), state->estimate);
     return real;
 }
 #endif

@@ -33,8 +33,8 @@ INLINE Int lane_event(LaneState *state, Real density, Bits k, Int ready)
     const Real size = after < 0.0f ? -after : after, survivor = (Real)(TRANSMITTANCE_ROULETTE);
     const Int small = ready & MASK(size < TRANSMITTANCE_ROULETTE);
     const Int lost = small & ~MASK(lane_uniform(k) * TRANSMITTANCE_ROULETTE < size);
-    const Real kept = small ? (after < 0.0f ? -survivor : survivor) : after;
-    state->estimate = ready ? (lost ? (Real)(0.0f) : kept) : before;
+    const Real kept = either(small, after < 0.0f ? -survivor : survivor, after);
+    state->estimate = either(ready, either(lost, (Real)(0.0f), kept), before);
     return lost;
 }
 #endif
