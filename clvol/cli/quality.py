@@ -21,7 +21,7 @@ class Extent:
     most: int
 
 
-QUALITIES = {"draft": Extent(0.1, 8), "good": Extent(0.03, 256), "final": Extent(0.01, 4096)}
+QUALITIES = {"draft": Extent(0.1, 8), "good": Extent(0.05, 128), "final": Extent(0.015, 2048)}
 """--quality: name and what it is."""
 USUAL = "good"
 """Of volumes, which say nothing of samples."""

@@ -69,8 +69,9 @@ def extremes(points: np.ndarray) -> np.ndarray:
 
 
 def coarse(grid: Grid) -> Coarse:
-    """The grid in at most `CELLS` cells along each axis."""
-    return _of_dense(grid) if isinstance(grid, DenseGrid) else _of_sparse(grid)
+    """The grid in at most `CELLS` cells along each axis; means beyond float32 are infinite."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _of_dense(grid) if isinstance(grid, DenseGrid) else _of_sparse(grid)
 
 
 def _block(size: np.ndarray) -> int:

@@ -95,7 +95,7 @@ def _remaining(
     if rest:
         names = ", ".join(map(repr, rest))
         raise VolumeError(
-            f"which of its grids is the density? It has {names}", where, "choose one by --density"
+            f"which of its grids is the density? It has {names}", where, "choose one as density"
         )
     reasons = [f"{grid.name!r}: {grid.unreadable}" for grid in listed if grid.unreadable]
     raise VolumeError("has no grid to render", where, "; ".join(reasons))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clvol.errors import VolumeError
+from clvol.scene.reader import ROUNDING
 from clvol.scene.records import ConstVolume, GridVolume
 from clvol.staging.finding import IN_UNITS, Found, find_grids, plain
 from clvol.staging.source import Field
@@ -27,6 +28,8 @@ HOTTEST = 2000.0
 """Kelvin that the greatest temperature then stands for."""
 COLD = 0.6
 """Share of the greatest temperature below which nothing glows, where no flame says what does."""
+LARGEST = 1e30
+"""Factor that is chosen, whatever the values."""
 BRIGHT = 0.45
 """Radiance that the brightest tenth of a fire should have."""
 
@@ -67,6 +70,11 @@ class Grids:
         if colour is not None and not colour.empty and colour.channels != 3:
             hint = "colour 'none' leaves it out"
             raise VolumeError(f"grid {colour.name!r} has one channel, a colour has three", where, hint)
+        if colour is not None and colour.peak > 1 + ROUNDING:
+            hint = "divide it in the file; colour 'none' leaves it out"
+            raise VolumeError(
+                f"grid {colour.name!r} is an albedo, at most 1, and reaches {colour.peak:.4g}", where, hint
+            )
 
     def dark(self) -> Grids:
         """Without anything that glows."""
@@ -120,7 +128,7 @@ def choose_scales(grids: Grids, options: SimpleNamespace, rays: Rays, peak: floa
         density = 1.0
         if plain(grids.found.density) not in IN_UNITS and values is not None:
             thick = thickness(values, rays)
-            density = _rounded(WANTED / thick) if thick > 0 else 1.0
+            density = _rounded(min(WANTED / thick, LARGEST)) if 0 < thick < np.inf else 1.0
     kelvin, coldest = _kelvin(grids, options, peak) if peak > 0 else (1.0, 0.0)
     emission = options.emission_scale
     if emission is None:
@@ -149,7 +157,7 @@ def _kelvin(grids: Grids, options: SimpleNamespace, peak: float) -> tuple[float,
 def _brightness(grids: Grids, sigma_t: np.ndarray, rays: Rays, absorbed: float, coldest: float) -> float:
     weight = _sampled(glowing(grids), rays)
     seen = glow(absorbed * sigma_t * np.where(weight > coldest, weight, 0), sigma_t, rays)
-    return _rounded(BRIGHT / seen) if seen > 0 else 1.0
+    return _rounded(min(BRIGHT / seen, LARGEST)) if 0 < seen < np.inf else 1.0
 
 
 def glowing(grids: Grids) -> Field:

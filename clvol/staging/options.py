@@ -113,7 +113,8 @@ def direction(name: str, value: Any) -> tuple[float, ...]:
     found = _numbers(value)
     if len(found) != 3 or not any(found):
         raise _wrong(name, "a direction as 1,2,-0.5", value)
-    return tuple(found)
+    largest = max(map(abs, found))
+    return tuple(one / largest for one in found)
 
 
 def light(name: str, value: Any) -> str:

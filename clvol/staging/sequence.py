@@ -12,8 +12,7 @@ from clvol.staging.coarse import extremes
 from clvol.staging.medium import Grids, Scales, choose_scales
 from clvol.staging.options import checked
 from clvol.staging.source import Source
-from clvol.staging.stage import Fixed, camera, settle
-from clvol.staging.thickness import Rays
+from clvol.staging.stage import Fixed, measured_rays, settle
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -102,7 +101,7 @@ def _scaled(
         settle(options, fixed)
         if fixed.flames and grids.flame is None:
             grids = grids.dark()
-        rays = Rays.through(fixed.box, camera(fixed, options, size)[1], size)
+        rays = measured_rays(fixed, options, size)
         scales.append((choose_scales(grids, options, rays, fixed.peak), grids.burns))
         tell()
     glowing = [one for one, burns in scales if burns] or [one for one, _ in scales]

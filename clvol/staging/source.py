@@ -96,6 +96,8 @@ class Field:
                 more = {"to_world": scale(size / size.max())} if cubic else {}
             else:
                 more = {"use_grid_bbox": True}
+        if isinstance(grid, DenseGrid) and grid.index_to_world is None and "data" in plugin:
+            more["data"] = grid.values  # checked and without masks: what was said of it is said once
         if more:
             plugin = plugin | more
             volume = load_plugin(plugin, grids)

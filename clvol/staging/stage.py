@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass, replace
 from itertools import product
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from clvol.scene.loader import load_staged
 from clvol.scene.records import GridVolume
 from clvol.scene.transforms import rotate, scale, translate
+from clvol.scene.views import check_size
 from clvol.staging.framing import FOV, Axes, View, frame, revolved
 from clvol.staging.lights import environment_file, look_emitters
 from clvol.staging.looks import LOOKS
@@ -24,7 +26,6 @@ from clvol.staging.up import guess_up
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from types import SimpleNamespace
 
     from clvol.scene.records import Scene
 
@@ -105,14 +106,14 @@ def stage(
     fixed : what other frames of the sequence have, else chosen for this volume.
     turn : degrees by which a turntable has been turned; None where there is none.
     """
-    options = checked(given)
+    options, size = checked(given), check_size(size)
     grids = Grids.of(source, options, of_sequence=fixed is not None)
     fixed = fixed or Fixed.of(source, grids, options)
     if fixed.flames and grids.flame is None:
         grids = grids.dark()
     settle(options, fixed)
     axes, view = camera(fixed, options, size, turn)
-    rays = Rays.through(fixed.box, view, size)
+    rays = measured_rays(fixed, options, size, turn)
     if fixed.scales is None:
         fixed = replace(fixed, scales=choose_scales(grids, options, rays, fixed.peak))
     assert fixed.scales is not None
@@ -134,6 +135,14 @@ def settle(options: SimpleNamespace, fixed: Fixed) -> None:
     """Fill in what is usual for what burns, and for what does not."""
     options.light = options.light or ("rim" if fixed.burns else "sun")
     options.albedo = options.albedo or ((DARK,) if fixed.burns else (ALBEDO,))
+
+
+def measured_rays(
+    fixed: Fixed, options: SimpleNamespace, size: tuple[int, int], turn: float | None = None
+) -> Rays:
+    """Rays through all of the volume, from where it fits the picture, however close the camera is."""
+    fitting = SimpleNamespace(**vars(options) | {"distance": 1.0})
+    return Rays.through(fixed.box, camera(fixed, fitting, size, turn)[1], size)
 
 
 def camera(

@@ -52,11 +52,11 @@ class Rays:
         return cls(view.eye + t[..., None] * directions[:, None], (far - near) / ALONG)
 
     def sample(self, volume: Volume, means: Coarse) -> np.ndarray:
-        """Values of a volume at the places, float32 (rays, places)."""
+        """Values of a volume at the places, float64 (rays, places)."""
         assert isinstance(volume, GridVolume)
         inverse = np.linalg.inv(volume.index_to_world)
         index = self.places.reshape(-1, 3) @ inverse[:3, :3].T + inverse[:3, 3]
-        return means.at(index).reshape(self.places.shape[:2])
+        return means.at(index).reshape(self.places.shape[:2]).astype(np.float64)
 
 
 def thickness(density: np.ndarray, rays: Rays) -> float:
