@@ -44,11 +44,11 @@ class Background(RegistryChoice):
     """How light from behind a medium is weighed; or a colour to be behind all, or "transparent"."""
 
     def __init__(self) -> None:
-        super().__init__("background")
+        super().__init__("background", pilot=True)
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
         """Both, as they stand in --help."""
-        return f"{super().get_metavar(param, ctx)}|COLOUR|transparent"
+        return f"{super().get_metavar(param, ctx)}|COLOUR"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """A name of the registry as it is; else what `clvol.staging.options.background` makes of it."""

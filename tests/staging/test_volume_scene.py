@@ -198,6 +198,14 @@ def test_what_is_behind_may_be_black() -> None:
     assert (image[0] == 0).all() and image[8, 8].min() > 0
 
 
+def test_what_is_behind_has_any_colour_or_none() -> None:
+    film = clvol.volume_scene(ball(), background="#ff8000").film
+    np.testing.assert_allclose(film.backdrop, [1, 0.2158605, 0], atol=1e-6)
+    assert clvol.volume_scene(ball(), background=0.25).film.backdrop == (0.25,)
+    clear = clvol.volume_scene(ball(), background="transparent")
+    assert clear.film.has_alpha and clear.integrator.hide_emitters
+
+
 @pytest.mark.parametrize(
     ("option", "value"),
     [
