@@ -163,8 +163,8 @@ def pair_error(pairs: np.ndarray) -> tuple[float, float]:
     The variance is that of pairs alone and what rounds have beyond it, a difference of two estimates.  By
     Satterthwaite's formula such a difference has a quarter of the rounds as degrees of freedom where the two
     are near each other, and bands of high level have no end.  But it is never below that of pairs alone,
-    which is known well.  So it counts with half as many as rounds by themselves have, at least: simulated bands
-    of 95 % then miss in 3 to 5 %.
+    which is known well.  So it counts with half as many as rounds by themselves have, at least: simulated
+    bands of 95 % then miss in 3 to 5 %.
     """
     count = len(pairs)
     away = pairs - np.diag(np.diag(pairs))
