@@ -49,10 +49,10 @@ class NanoTree(SparseParts):
         layout = self.layout
         head = self.bytes.take(at, layout.root)
         self.set_background(self._values(np.frombuffer(head, np.uint8)[None, layout.background :])[0])
-        (count,) = np.frombuffer(head, "<u4", 1, 24)
+        count = int(np.frombuffer(head, "<u4", 1, 24)[0])
         if count * layout.tile > self.bytes.size:
             self.fail(f"its root has {count} tiles, in {self.bytes.size} bytes")
-        tiles = np.frombuffer(self.bytes.take(at + layout.root, int(count) * layout.tile), np.uint8)
+        tiles = np.frombuffer(self.bytes.take(at + layout.root, count * layout.tile), np.uint8)
         tiles = tiles.reshape(-1, layout.tile)
         key = tiles[:, :8].copy().view("<u8")[:, 0]
         shifts = np.array([2 * KEY_BITS, KEY_BITS, 0], np.uint64)
@@ -65,33 +65,39 @@ class NanoTree(SparseParts):
         self.add_root_tiles(origins[constant], values, active[constant])
         for origin in origins[~constant].tolist():
             self.add_root_origin(tuple(origin))
-        return self._in_order(origins[~constant], at + child[~constant])
+        below, parents = child[~constant], np.full(np.count_nonzero(~constant), at, np.int64)
+        sizes = layout.root + count * layout.tile, layout.upper
+        return self._next_level(origins[~constant], parents, below, sizes)
 
     def read_internal(
         self, origins: np.ndarray, offsets: np.ndarray, child_edge: int, edge: int
     ) -> tuple[np.ndarray, np.ndarray]:
         """Tiles of internal nodes at these places; origins and offsets of the nodes below them."""
-        table, size = (
-            (self.layout.upper_table, self.layout.upper)
+        layout = self.layout
+        table, size, child_size = (
+            (layout.upper_table, layout.upper, layout.lower)
             if (child_edge, edge) == UPPER
-            else (self.layout.lower_table, self.layout.lower)
+            else (layout.lower_table, layout.lower, layout.leaf or layout.leaf_values)
         )
-        below: list[tuple[np.ndarray, np.ndarray]] = []
+        below: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         count = max(1, BATCH_BYTES // size)
         for first in range(0, len(offsets), count):
             at = offsets[first : first + count]
             nodes = self.bytes.records(at, size)
             places = origins[first : first + count, None] + child_edge * CHILD_COORDINATES[edge]
             below.append(self._read_nodes(nodes, at, places, table, child_edge))
-            self.claim(self.leaf_count + sum(len(part) for _, part in below), self.tile_count)
-        nowhere = (np.empty((0, 3), np.int32), np.empty(0, np.int64))
-        found, where = (np.concatenate(column) for column in zip(nowhere, *below, strict=True))
-        return self._in_order(found, where)
+            self.claim(sum(len(part) for part, _, _ in below), self.tile_count)
+        nowhere = (np.empty((0, 3), np.int32), np.empty(0, np.int64), np.empty(0, np.int64))
+        found, parents, child = (np.concatenate(column) for column in zip(nowhere, *below, strict=True))
+        return self._next_level(found, parents, child, (size, child_size))
 
     def _read_nodes(
         self, nodes: np.ndarray, at: np.ndarray, places: np.ndarray, table: int, child_edge: int
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Keep the tiles of some nodes; `places` are the origins of their entries, int32 (n, entries, 3)."""
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Keep the tiles of some nodes; `places` are the origins of their entries, int32 (n, entries, 3).
+
+        Of their children: origins, the offsets of the nodes that point at them, and what these say.
+        """
         mask_bytes = places.shape[1] // 8
         masks = nodes[:, NODE_MASKS : NODE_MASKS + 2 * mask_bytes]
         active, is_child = mask_bits(masks[:, :mask_bytes]), mask_bits(masks[:, mask_bytes:])
@@ -103,7 +109,7 @@ class NanoTree(SparseParts):
         if kept.any():
             self.add_tiles(places[tiles][kept], child_edge, values[kept], active[tiles][kept])
         child = entries[is_child][:, :8].copy().view("<i8")[:, 0]
-        return places[is_child], np.repeat(at, is_child.sum(axis=1)) + child
+        return places[is_child], np.repeat(at, is_child.sum(axis=1)), child
 
     def _values(self, raw: np.ndarray) -> np.ndarray:
         """What bytes, uint8 (n, at least a value's), begin with: float32 (n, channels)."""
@@ -111,13 +117,22 @@ class NanoTree(SparseParts):
         with np.errstate(over="ignore", invalid="ignore"):
             return stored.view(self.kind.value).astype(np.float32)
 
-    def _in_order(self, origins: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Nodes by their offsets; fail if two places share a node."""
+    def _next_level(
+        self, origins: np.ndarray, parents: np.ndarray, child: np.ndarray, sizes: tuple[int, int]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes in the order of their offsets, `parents` + `child`; fail where nodes overlap.
+
+        sizes : of the nodes that point at them, and their own.
+        """
+        offsets, (parent, own) = parents + child, sizes
+        within = np.flatnonzero((child > -own) & (child < parent))
+        if len(within):
+            self.fail(f"the node at byte {offsets[within[0]]} lies within the one that points at it")
         order = np.argsort(offsets, kind="stable")
         offsets = offsets[order]
-        shared = np.flatnonzero(np.diff(offsets) == 0)
-        if len(shared):
-            self.fail(f"two places share the node at byte {offsets[shared[0]]}")
+        overlaps = np.flatnonzero(np.diff(offsets) < own)
+        if len(overlaps):
+            self.fail(f"nodes overlap at byte {offsets[overlaps[0] + 1]}")
         return origins[order], offsets
 
     def read_leaves(self, offsets: np.ndarray) -> None:

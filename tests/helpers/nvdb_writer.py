@@ -108,7 +108,7 @@ def grid_bytes(spec: GridSpec, kind: str, version: int = 67112962, magic: bytes 
     uppers = sorted({_floor(place, 4096) for place in places})
     lower_places = [*spec.leaves, *(tile[0] for tile in inner if tile[1] == 8)]
     lowers = sorted({_floor(place, 128) for place in lower_places})
-    leaves = [_leaf(spec, kind, n, leaf_at, leaf_size) for n in range(len(spec.leaves))]
+    leaves = [_leaf(*leaf, kind, n, leaf_at, leaf_size) for n, leaf in enumerate(spec.leaves.items())]
     root = 736
     first_upper = root + root_size + tile_size * (len(uppers) + len(root_tiles))
     first_lower = first_upper + nodes[1] * len(uppers)
@@ -177,9 +177,8 @@ def _node(spec, place, edge, layout, entry, number, at, below) -> bytes:
     return bytes(node)
 
 
-def _leaf(spec: GridSpec, kind: str, number: int, values_at: int, size: int) -> bytes:
-    (place, (values, active)) = list(spec.leaves.items())[number]
-    head = bytearray(values_at)
+def _leaf(place, held, kind: str, number: int, values_at: int, size: int) -> bytes:
+    (values, active), head = held, bytearray(values_at)
     bits = bits_of(kind, number)
     struct.pack_into("<3i", head, 0, *place)
     head[15] = (bits.bit_length() - 1) << 5 if kind == "FpN" else 0
