@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     )
     from clvol.scene.records import Scene
     from clvol.staging.stage import volume_scene
+    from clvol.volumes.loading import load_volume
 
 __all__ = [
     "Comparison",
@@ -65,6 +66,7 @@ __all__ = [
     "load_dict",
     "load_file",
     "load_string",
+    "load_volume",
     "look_at",
     "merge",
     "plan",
@@ -104,6 +106,7 @@ _MODULES = {
     ],
     "clvol.scene.records": ["Scene"],
     "clvol.staging.stage": ["volume_scene"],
+    "clvol.volumes.loading": ["load_volume"],
 }
 """The imports above, for those that run clvol rather than read it."""
 _EXPORTS = {name: module for module, names in _MODULES.items() for name in names}

@@ -73,6 +73,7 @@ def _metadata(session: Session, first: int, samples: np.ndarray) -> dict[str, An
         **({"biased": ", ".join(biased), "step": plan.choices.step or "voxel"} if biased else {}),
         **({"channels_apart": f"1 : {apart:.3g}"} if apart else {}),
         **({"pixel_format": scene.film.pixel_format} if scene.film.has_alpha else {}),
+        **_repairs(session),
         "spp": int(samples[0]) if even else round(float(samples.mean()), 3),
         **said_ranges(((first, int(samples.max())),)),
         "seed": session.seed,
@@ -80,6 +81,13 @@ def _metadata(session: Session, first: int, samples: np.ndarray) -> dict[str, An
         "version": __version__,
         "seconds": round(session.seconds, 4),
     }
+
+
+def _repairs(session: Session) -> dict[str, str]:
+    """Which volumes had samples that were taken as 0, and how many."""
+    volumes = session.prepared.matter.volumes
+    said = [f"{volume.source}: {volume.repairs}" for volume in volumes if volume.repairs]
+    return {"sanitized": "; ".join(said)} if said else {}
 
 
 def _pictures(session: Session, samples: np.ndarray, estimate: Estimate) -> dict[str, np.ndarray]:

@@ -12,7 +12,10 @@ _BLOCKS, _BLOCK_VALUES = 256, 4096
 take seconds."""
 
 
-_APART = ("source", "name", "spp", "seed", "choices", "sensors", "component_format", "kept")
+_APART = (
+    *("source", "name", "spp", "seed", "choices", "sensors", "component_format", "kept"),
+    *("sanitize", "repairs"),  # the samples tell
+)
 """Fields that do not tell scenes apart."""
 
 

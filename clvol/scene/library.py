@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
     from clvol.volumes.grid import Grid
 
-Grids = dict[tuple["Path", str | None], "Grid"]
-"""Volumes by file and grid: each is read once."""
+Grids = dict[tuple["Path", str | None, str], "Grid"]
+"""Volumes by file, grid and what is made of a level set: each is read once."""
 PluginTable = Mapping[str, Mapping[str, Callable[[Any], object]]]
 """By kind and name of the plugin; each function turns a `clvol.scene.reader.Reader` into a record."""
 
@@ -42,6 +42,7 @@ class Library:
         self.plugins = plugins
         self.grids: Grids = {} if grids is None else grids
         self.reduced: dict[int, Any] = {}  # by id() of a grid or volume that `grids` or a record keeps alive
+        self.sanitized: dict[tuple[int, bool], Any] = {}  # the same, and whether negative ones stay
         self.taken: set[int] = set()  # id() of every plugin that another one holds or refers to
         self.built: dict[int, Any] = {}  # records, by id() of their node
         self.open: list[Node] = []  # what is being built, the outermost first

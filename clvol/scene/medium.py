@@ -15,6 +15,7 @@ from clvol.scene.volume import largest_value, limited
 from clvol.volumes import check_coefficients, check_finite
 from clvol.volumes.grid import DenseGrid
 from clvol.volumes.proportional import proportional_channels
+from clvol.volumes.repair import sanitized
 
 log = logging.getLogger("clvol")
 
@@ -98,7 +99,7 @@ def _coefficient(
     """Parameter `name`, a number, a colour or a volume, with values in [0, maximum]."""
     if reader.is_value(name):
         return ConstVolume(reader.color(name, default, light, maximum))
-    volume = _volume(reader, name, "a number, a colour or a volume")
+    volume = _sane(reader, _volume(reader, name, "a number, a colour or a volume"))
     if isinstance(volume, GridVolume):
         check_coefficients(volume.grid, f"{name} of medium '{reader.type}'")
     if np.isfinite(maximum) and (largest := largest_value(volume)) > maximum:
@@ -107,6 +108,23 @@ def _coefficient(
         log.warning("%s: the volume reaches %.9g, taken as %g", reader.node.place(name), largest, maximum)
         volume = limited(volume, maximum)
     return volume
+
+
+def _sane(reader: Reader, volume: Volume, signed: bool = False) -> Volume:
+    """The volume as it is to be used: with the samples repaired that it asks for.
+
+    What media share stays shared.  signed : as in `sanitized`.
+    """
+    if not isinstance(volume, GridVolume) or not volume.sanitize:
+        return volume
+    done = reader.library.sanitized
+    if (id(volume.grid), signed) not in done:
+        done[id(volume.grid), signed] = sanitized(volume.grid, signed)
+    if (id(volume), signed) not in done:
+        grid, repairs = done[id(volume.grid), signed]
+        done[id(volume), signed] = replace(volume, grid=grid, repairs=str(repairs))
+    repaired: Volume = done[id(volume), signed]
+    return repaired
 
 
 def _volume(reader: Reader, name: str, expected: str) -> Volume:
@@ -151,7 +169,7 @@ def _temperature(reader: Reader) -> Volume:
     name, expected = "temperature", "a number or a volume of one channel"
     if reader.is_value(name):
         return ConstVolume((reader.number(name, 0.0),))
-    volume = _volume(reader, name, expected)
+    volume = _sane(reader, _volume(reader, name, expected), signed=True)
     if channels_of(volume) > 1:
         reader.fail(f"'{name}' of medium '{reader.type}' must be {expected}, this one has three", name)
     if isinstance(volume, GridVolume):

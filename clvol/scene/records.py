@@ -125,6 +125,8 @@ class GridVolume:
     wrap_mode: str = "clamp"  # "clamp" | "repeat" | "mirror": values outside lower..upper
     clipped: bool = True  # False: a vdb whose background is not 0 reaches beyond its box
     source: str = ""  # file and grid, for messages
+    sanitize: bool = False  # NaN and slightly negative samples are to be 0
+    repairs: str = ""  # how many of them were
 
 
 Volume = ConstVolume | GridVolume

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -15,9 +15,13 @@ from clvol.volumes import dense_from_array, read_volume
 from clvol.volumes.files import place
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
 from clvol.volumes.labelled import grid_from_labelled, is_labelled
+from clvol.volumes.level_set import USES, fog_of
 from clvol.volumes.read import SPARSE, read_sparse
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
     from clvol.scene.reader import Reader
 
 log = logging.getLogger("clvol")
@@ -36,12 +40,7 @@ def vdbvolume(reader: Reader) -> Volume:
     if not reader.has("filename"):
         reader.fail("a vdbvolume needs a filename")
     path = find_parameter(reader, "filename")
-    name = reader.string("grid", "density")
-    grids = reader.library.grids
-    key = (path.resolve(), name)
-    if key not in grids:
-        grids[key] = read_sparse(path, name)
-    grid = grids[key]
+    grid = _read(reader, path, reader.string("grid", "density"), read_sparse)
     if not isinstance(grid, SparseGrid):
         reader.fail(
             f"a vdbvolume reads OpenVDB and NanoVDB, not '{path.name}'", "filename", "use a gridvolume"
@@ -86,7 +85,14 @@ def gridvolume(reader: Reader) -> Volume:
         index_to_world = reader.transform() @ grid.index_to_world
     filter_type = reader.string("filter_type", "trilinear", FILTER_TYPES)
     return GridVolume(
-        grid, index_to_world, np.full(3, -0.5), size - 0.5, filter_type, wrap_mode, source=grid.source
+        grid,
+        index_to_world,
+        np.full(3, -0.5),
+        size - 0.5,
+        filter_type,
+        wrap_mode,
+        source=grid.source,
+        sanitize=reader.boolean("sanitize", False),
     )
 
 
@@ -106,6 +112,8 @@ def _grid(reader: Reader) -> Grid:
     if sources != ["filename"]:
         if name is not None:
             reader.fail(f"an array has no grid named '{name}'", "grid", "the name goes with a filename")
+        if isinstance(reader.node[sources[0]], DenseGrid | SparseGrid):
+            return cast("Grid", reader.raw(sources[0]))
         where = reader.node.place(sources[0])
         if is_labelled(reader.node[sources[0]]):
             return grid_from_labelled(reader.raw(sources[0]), where)
@@ -114,13 +122,20 @@ def _grid(reader: Reader) -> Grid:
     if inside is not None and name is not None:
         reader.fail(f"the filename names an array itself, '{inside}'", "grid", "give one of them")
     name = inside if name is None else name
-    grids = reader.library.grids
     if name is None and path.suffix.lower() in SPARSE:
         name = "density"
-    key = (path.resolve(), name)
-    if key not in grids:
-        grids[key] = read_volume(path, key[1])
-    return grids[key]
+    return _read(reader, path, name, read_volume)
+
+
+def _read(reader: Reader, path: Path, name: str | None, read: Callable[[Path, str | None], Grid]) -> Grid:
+    """A grid of a file, as a fog volume where that is asked for; it is read and made once per scene."""
+    grids, use = reader.library.grids, reader.string("level_set", "", USES)
+    resolved = path.resolve()
+    if (resolved, name, "") not in grids:
+        grids[resolved, name, ""] = read(path, name)
+    if (resolved, name, use) not in grids:
+        grids[resolved, name, use] = fog_of(grids[resolved, name, ""])
+    return grids[resolved, name, use]
 
 
 def _sparse_volume(reader: Reader, grid: SparseGrid) -> Volume:
@@ -132,6 +147,7 @@ def _sparse_volume(reader: Reader, grid: SparseGrid) -> Volume:
     filter_type = reader.string("filter_type", "trilinear", FILTER_TYPES)
     if grid.active_voxels == 0 and grid.clear_outside:
         log.warning("%s: has no active voxels, and is 0 everywhere", place(grid.source, grid.name))
+        reader.ignore(sanitize=bool)
         return ConstVolume((0.0,), to_world)
     return GridVolume(
         grid,
@@ -141,6 +157,7 @@ def _sparse_volume(reader: Reader, grid: SparseGrid) -> Volume:
         filter_type,
         clipped=grid.clear_outside,
         source=f"{grid.source}:{grid.name}" if grid.name not in grid.source else grid.source,
+        sanitize=reader.boolean("sanitize", False),
     )
 
 

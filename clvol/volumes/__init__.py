@@ -8,6 +8,7 @@ from clvol.volumes.check import check_coefficients, check_finite
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
 from clvol.volumes.grid_info import GridInfo
 from clvol.volumes.listing import Listed, list_grids
+from clvol.volumes.loading import load_volume
 from clvol.volumes.numpy_files import dense_from_array, read_numpy
 from clvol.volumes.nvdb import list_nvdb, read_nvdb
 from clvol.volumes.read import read_volume
@@ -26,6 +27,7 @@ __all__ = [
     "list_grids",
     "list_nvdb",
     "list_vdb",
+    "load_volume",
     "read_numpy",
     "read_nvdb",
     "read_vdb",

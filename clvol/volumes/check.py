@@ -8,13 +8,15 @@ import numpy as np
 
 from clvol.errors import VolumeError
 from clvol.volumes.files import place
-from clvol.volumes.grid import DenseGrid, Grid
+from clvol.volumes.grid import LEVEL_SET, DenseGrid, Grid
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 # Samples looked at together: the largest temporary is one mask of them.
 SLAB = 1 << 22
+SLIGHT = 0.1
+"""Negative samples down to so much of the greatest are slight: resampling with sharp filters leaves them."""
 
 
 def check_coefficients(grid: Grid, what: str = "density") -> None:
@@ -41,9 +43,15 @@ def _check(grid: Grid, what: str, signed: bool) -> None:
             raise VolumeError(f"{what} has no samples", where)
     elif grid.active_voxels == 0:
         raise VolumeError(f"{what} has no active voxels", where, "choose another grid or file")
+    elif grid.kind == LEVEL_SET:
+        raise VolumeError(
+            f"{what} is a level set: distances to a surface, not amounts of something",
+            where,
+            'make a fog volume of it: level_set="fog"',
+        )
     total = broken = negative = 0
     lowest = 0.0
-    for slab in _slabs(grid):
+    for slab in slabs(grid):
         total += slab.size
         low, high = slab.min(), slab.max()
         if (np.isfinite(low) if signed else low >= 0) and np.isfinite(high):
@@ -63,11 +71,25 @@ def _check(grid: Grid, what: str, signed: bool) -> None:
         raise VolumeError(
             f"{what} has {' and '.join(faults)} of {total} samples",
             where,
-            f"samples must be finite{'' if signed else ' and at least 0'}: repair or clamp the data",
+            f"samples must be finite{'' if signed else ' and at least 0'}: repair or clamp the data, or "
+            f"give the volume sanitize=True{_what_sanitize_leaves(grid, lowest, signed)}",
         )
 
 
-def _slabs(grid: Grid) -> Iterator[np.ndarray]:
+def _what_sanitize_leaves(grid: Grid, lowest: float, signed: bool) -> str:
+    """What of a grid's faults `clvol.volumes.repair.sanitized` does not take as 0, for a hint."""
+    least = -SLIGHT * greatest(grid)
+    left = ["infinite samples"] if any(np.isinf(slab).any() for slab in slabs(grid)) else []
+    left += [f"those below {least:.6g}"] if lowest < least and not signed else []
+    return f", which leaves {' and '.join(left)}" if left else ""
+
+
+def greatest(grid: Grid) -> float:
+    """The greatest finite sample, at least 0."""
+    return max(float(slab.max(where=np.isfinite(slab), initial=0.0)) for slab in slabs(grid))
+
+
+def slabs(grid: Grid) -> Iterator[np.ndarray]:
     """Every stored sample, in flat views of at most SLAB."""
     if isinstance(grid, DenseGrid):
         stores = [grid.values]

@@ -141,6 +141,19 @@ def others() -> Grids:
     return [*grids, points, frustum, cloud(name="after", seed=5)]
 
 
+def colours(kind: str) -> Any:
+    """Vectors at random, some of them inactive, and a tile."""
+    grid = getattr(vdb, kind)((0.5, 0.25, 2.0))
+    grid.name = "Cd"
+    values = RNG.random((21, 17, 30, 3))
+    grid.copyFromArray(values, ijk=(-9, 4, 120), tolerance=(0.0, 0.0, 0.0))
+    grid.fill((64, 0, 0), (71, 7, 7), (1.0, 0.5, 0.125))
+    for number, item in enumerate(grid.iterOffValues()):
+        if item.count == 1:
+            item.value = (0.5, 0.25, 2.0) if number % 3 else (0.25, 0.5, 1.0)
+    return grid
+
+
 def emptied(background: float) -> Grids:
     grid = vdb.FloatGrid(background)
     grid.name = "density"
@@ -174,6 +187,10 @@ VARIANTS = {
     "int64": lambda: [cloud("Int64Grid", background=3)],
     "int32 half": lambda: [halved(cloud("Int32Grid"))],
     "int64 half": lambda: [halved(cloud("Int64Grid", background=3))],
+    "vec3s": lambda: [colours("Vec3SGrid")],
+    "vec3s half": lambda: [halved(colours("Vec3SGrid"))],
+    "vec3d": lambda: [colours("Vec3DGrid")],
+    "vec3d half": lambda: [halved(colours("Vec3DGrid"))],
     "tiles": tiles,
     "half tiles": lambda: [halved(tiles()[0])],
     "root tile": root_tile,
@@ -224,7 +241,7 @@ def facts(grid: Any) -> dict[str, Any]:
     """What OpenVDB says of a grid; only its name and type where its values are no numbers."""
     known = {"name": grid.name, "type": grid.valueTypeName, "linear": grid.transform.isLinear}
     if (
-        not isinstance(grid.background, int | float)
+        not isinstance(grid.background, int | float | tuple)
         or isinstance(grid.background, bool)
         or not known["linear"]
     ):

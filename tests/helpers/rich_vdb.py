@@ -28,11 +28,26 @@ def rich_grid(**options) -> GridSpec:
         ((256, 128, 0), 128, 7, True),
         ((384, 128, 0), 128, 1, False),
     ]
+    return as_vectors(spec) if spec.value_type in VECTOR_TYPES else spec
+
+
+def as_vectors(spec: GridSpec) -> GridSpec:
+    """The same grid with three channels, of which the others are multiples of the first."""
+    spec.background = times_colour(spec.background)
+    spec.leaves = {o: (times_colour(values), active) for o, (values, active) in spec.leaves.items()}
+    spec.tiles = [(o, edge, times_colour(value), active) for o, edge, value, active in spec.tiles]
     return spec
 
 
+def times_colour(values):
+    """Numbers as vectors: a tuple of one number, an array with another axis of arrays."""
+    vectors = np.multiply.outer(values, [1.0, 2.0, 0.5])
+    return vectors if np.ndim(values) else tuple(vectors.tolist())
+
+
+VECTOR_TYPES = ("vec3s", "vec3d")
 # OpenVDB stores no integers in half.
-STORED_TYPES = [(t, False) for t in ("float", "double", "int32", "int64")] + [
-    ("float", True),
-    ("double", True),
+STORED_TYPES = [
+    *((t, False) for t in ("float", "double", "half", "int32", "int64", *VECTOR_TYPES)),
+    *((t, True) for t in ("float", "double", *VECTOR_TYPES)),
 ]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 MAGIC = 0x56444220
 ZIP, ACTIVE_MASK, BLOSC = 1, 2, 4
-LETTERS = {"float": "f", "double": "d", "int32": "i", "int64": "q"}
+LETTERS = {"float": "f", "double": "d", "half": "e", "int32": "i", "int64": "q", "vec3s": "f", "vec3d": "d"}
 UNIT_SCALE = ("UniformScaleMap", [1.0] * 15)
 
 
@@ -27,7 +27,8 @@ UNIT_SCALE = ("UniformScaleMap", [1.0] * 15)
 class GridSpec:
     """One grid of a file.
 
-    leaves : origin (x, y, z) -> (values (8, 8, 8) indexed [x, y, z], active bool (8, 8, 8)).
+    leaves : origin (x, y, z) -> (values (8, 8, 8) indexed [x, y, z], active bool (8, 8, 8)); of vectors
+        values are (8, 8, 8, 3), and background and tiles have three.
     tiles : (origin, edge 8 | 128 | 4096, value, active).
     transform : name of the map and the doubles it stores.
     grid_type : overrides the type's name.  parent : unique name of the grid whose tree is shared.
@@ -90,16 +91,20 @@ def write_vdb(path, grids: Sequence[GridSpec], version: int = 224, has_offsets: 
     return bytes(out)
 
 
-def inactive_code(inactive: np.ndarray, background: float) -> tuple[int, list[float]]:
+def inactive_code(inactive: np.ndarray, background: np.ndarray) -> tuple[int, list]:
     """How OpenVDB stores these inactive values: code 0–6, and the values that are written."""
-    values = sorted(set(inactive.tolist()))
+    if background.ndim:
+        values = sorted(set(map(tuple, inactive.tolist())))
+        background, minus = tuple(background.tolist()), tuple((-background).tolist())
+    else:
+        values, background, minus = sorted(set(inactive.tolist())), background.item(), -background.item()
     if set(values) <= {background}:
         return 0, []
-    if values == [-background]:
+    if values == [minus]:
         return 1, []
     if len(values) == 1:
         return 2, values
-    if set(values) == {background, -background}:
+    if set(values) == {background, minus}:
         return 3, []
     if len(values) == 2 and background in values:
         return 4, [v for v in values if v != background]
@@ -142,12 +147,12 @@ def _values(values: np.ndarray, active: np.ndarray, grid: GridSpec) -> bytes:
     if not grid.compression & ACTIVE_MASK:
         return b"\x06" + _block(values.reshape(-1), grid)
     values = values.astype("<" + grid.letter)
-    background = values.dtype.type(grid.background).item()
+    background = np.array(grid.background, values.dtype)
     code, written = inactive_code(values[~active], background)
-    out = struct.pack(f"<B{len(written)}{grid.letter}", code, *written)
+    out = bytes([code]) + np.array(written, values.dtype).tobytes()
     if code in (3, 4, 5):
-        second = written[1] if code == 5 else background
-        out += _mask(~active & (values == second))
+        same = values == np.array(written[1] if code == 5 else background)
+        out += _mask(~active & (same.all(axis=-1) if background.ndim else same))
     return out + _block(values.reshape(-1) if code == 6 else values[active], grid)
 
 
@@ -156,9 +161,11 @@ def _tree(grid: GridSpec) -> tuple[bytes, bytes]:
     inner = [tile for tile in grid.tiles if tile[1] < 4096]
     root_tiles = [tile for tile in grid.tiles if tile[1] == 4096]
     children = sorted({_floor(o, 4096) for o in [*grid.leaves, *(tile[0] for tile in inner)]})
-    out = struct.pack(f"<i{grid.letter}II", 1, grid.background, len(root_tiles), len(children))
+    letter = "<" + grid.letter
+    out = struct.pack("<i", 1) + np.array(grid.background, letter).tobytes()
+    out += struct.pack("<II", len(root_tiles), len(children))
     for origin, _, value, active in root_tiles:
-        out += struct.pack(f"<3i{grid.letter}?", *origin, value, active)
+        out += struct.pack("<3i", *origin) + np.array(value, letter).tobytes() + bytes([active])
     buffers = b""
     for child in children:
         nodes, leaves = _node(grid, child, 4096)
@@ -170,8 +177,8 @@ def _node(grid: GridSpec, origin: tuple[int, ...], edge: int) -> tuple[bytes, by
     """An internal node of `edge` samples (4096 or 128): its topology and the buffers below it."""
     cell = 128 if edge == 4096 else 8
     count = edge // cell
-    values = np.full((count,) * 3, grid.background, np.float64)
-    active, child = np.zeros(values.shape, bool), np.zeros(values.shape, bool)
+    values = np.full((count,) * 3 + np.shape(grid.background), grid.background, np.float64)
+    active, child = np.zeros((count,) * 3, bool), np.zeros((count,) * 3, bool)
     below = [*grid.leaves, *(t[0] for t in grid.tiles if t[1] < cell)]
     for position in below:
         if _floor(position, edge) == origin:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from nvdb_writer import BLOSC, LAYOUTS, NONE, ZIP, grid_bytes, stored_values, version_number, write_nvdb
 from places import CASES
-from rich_vdb import rich_grid
+from rich_vdb import as_vectors, rich_grid
 from vdb_writer import GridSpec, write_vdb
 from volume_samples import probe
 
@@ -23,7 +23,6 @@ from clvol.volumes import list_grids, list_nvdb, read_nvdb, read_vdb, read_volum
 from clvol.volumes.nvdb_layout import READABLE, Layout
 
 FILES = CASES / "nvdb"
-CHANNELS = {"Vec3f": 3, "Vec3d": 3}
 LETTERS = {"Int16": "int32", "Int32": "int32", "Int64": "int64", "UInt32": "int32", "UInt8": "int32"}
 STORED = {
     "zip.nvdb": ["Float", "Fp16", "Vec3f", "Double", "Int32", "Vec3d"],
@@ -69,14 +68,7 @@ def rich(kind: str) -> GridSpec:
     spec.tiles = [*spec.tiles, ((8192, 0, 0), 4096, 3, True)]
     if kind in ("UInt32", "UInt8"):
         spec.leaves = {place: (abs(values), active) for place, (values, active) in spec.leaves.items()}
-    if kind in CHANNELS:
-        spec.background = (2, 1, 0)
-        spec.leaves = {
-            place: (values[..., None] + np.array([0, 1, 2]), active)
-            for place, (values, active) in spec.leaves.items()
-        }
-        spec.tiles = [(place, edge, (value, 1, 7), on) for place, edge, value, on in spec.tiles]
-    return spec
+    return as_vectors(spec) if kind in ("Vec3f", "Vec3d") else spec
 
 
 def assert_holds(read, spec: GridSpec, kind: str) -> None:

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 REQUIREMENT = "bpy==5.0.*"
-RENDERED = ("float", "double", "int32", "int64")
-REFUSED = {"bool", "vec3s", "vec3i", "vec3d", "points", "frustum"}
+RENDERED = ("float", "double", "half", "int32", "int64", "vec3s", "vec3d")
+REFUSED = {"bool", "vec3i", "points", "frustum"}
 
 OURS = {
     f"{value_type}{' half' if half else ''}, compression {mask | codec}": {
@@ -39,6 +39,7 @@ OURS = {
         "compression": mask | codec,
     }
     for (value_type, half), mask, codec in product(STORED_TYPES, (0, ACTIVE_MASK), (0, ZIP, BLOSC))
+    if value_type != "half"  # not before OpenVDB 13
 }
 """Files by the tests' own writer, which can choose the compression as OpenVDB's module cannot."""
 NAME = ("name", "string", b"density")
@@ -96,12 +97,13 @@ def test_the_reader_finds_what_openvdb_finds(folder, variant):
                 read = read_vdb(path, choice)
                 assert read.name == name
                 assert read.active_voxels == known["active"]
-                assert read.background == np.float32(known["background"])
+                assert np.array_equal(read.background, np.float32(np.ravel(known["background"])))
                 assert np.allclose(read.index_to_world, known["matrix"], rtol=1e-12, atol=1e-12)
                 if known["box"]:
                     assert read.active_box.tolist() == known["box"]
                     values, active = probe(read, stored[f"{number}_places"])
-                    assert np.array_equal(values, stored[f"{number}_values"].astype("f4"), equal_nan=True)
+                    expected = stored[f"{number}_values"].astype("f4").reshape(values.shape)
+                    assert np.array_equal(values, expected, equal_nan=True)
                     assert np.array_equal(active, stored[f"{number}_active"])
 
 

@@ -136,7 +136,7 @@ def test_fire_is_read_leaf_by_leaf_and_not_voxel_by_voxel():
 @pytest.mark.parametrize("code", range(7))
 def test_sample_leaves_cover_every_code(code):
     values, active = leaf(INACTIVE[code], code)
-    assert inactive_code(values[~active], 2)[0] == code
+    assert inactive_code(values[~active], np.array(2.0))[0] == code
 
 
 @pytest.mark.parametrize(("value_type", "half"), STORED_TYPES)
@@ -149,14 +149,14 @@ def test_every_storage_reads_back_exactly(tmp_path, value_type, half, mask, code
     stored = {tuple(o): i for i, o in enumerate(read.leaf_origins.tolist())}
     assert set(stored) == set(spec.leaves)
     for origin, (values, active) in spec.leaves.items():
-        assert np.array_equal(read.leaf_values[stored[origin], ..., 0], values.transpose(2, 1, 0)), origin
+        expected = values.reshape(8, 8, 8, -1).transpose(2, 1, 0, 3)
+        assert np.array_equal(read.leaf_values[stored[origin]], expected), origin
         bits = np.unpackbits(read.leaf_active[stored[origin]], bitorder="little").reshape(8, 8, 8)
         assert np.array_equal(bits, active), origin
-    columns = zip(
-        read.tile_origins.tolist(), read.tile_sizes, read.tile_values, read.tile_active, strict=True
-    )
-    assert sorted((tuple(o), s, v, a) for o, s, v, a in columns) == sorted(spec.tiles)
-    assert read.background == 2
+    columns = (read.tile_origins.tolist(), read.tile_sizes, read.tile_values, read.tile_active)
+    tiles = sorted((tuple(o), s, tuple(v), a) for o, s, v, a in zip(*columns, strict=True))
+    assert tiles == sorted((o, s, tuple(np.ravel(v)), a) for o, s, v, a in spec.tiles)
+    assert read.background.tolist() == np.ravel(spec.background).tolist()
 
 
 @pytest.mark.parametrize(("value_type", "value"), [("float", 0.5), ("double", 0.5), ("int64", 5)])
