@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from clvol.lab.ray.view import RayView
     from clvol.lab.selftest import selftest
     from clvol.lab.verdict import SelfTest
+    from clvol.picture.loading import load_result
     from clvol.picture.merging import merge
     from clvol.picture.result import Result
     from clvol.planning.plan import Plan
@@ -65,6 +66,7 @@ __all__ = [
     "compare",
     "load_dict",
     "load_file",
+    "load_result",
     "load_string",
     "load_volume",
     "look_at",
@@ -90,6 +92,7 @@ _MODULES = {
     "clvol.lab.ray.view": ["RayView"],
     "clvol.lab.selftest": ["selftest"],
     "clvol.lab.verdict": ["SelfTest"],
+    "clvol.picture.loading": ["load_result"],
     "clvol.picture.merging": ["merge"],
     "clvol.picture.result": ["Result"],
     "clvol.planning.plan": ["Plan"],

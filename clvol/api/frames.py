@@ -12,7 +12,7 @@ from clvol.api.order import Order
 from clvol.api.renders import render
 from clvol.base.arguments import positive
 from clvol.base.interrupts import interruptible
-from clvol.errors import RenderError
+from clvol.errors import OptionError, RenderError
 from clvol.picture.result import Result
 
 if TYPE_CHECKING:
@@ -179,4 +179,7 @@ def progressive(scene: Scene, *, interval: float = 0.25, **options: Any) -> Fram
             raise TypeError(f"progressive() takes interval and {', '.join(known)}, not {name!r}")
     if interval != 0:
         positive("interval=", interval, " of seconds")
-    return Frames(Order.of("progressive", scene, known | options), interval)
+    order = Order.of("progressive", scene, known | options)
+    if not order.count:
+        raise OptionError("there is nothing to render: the picture to go on from has these samples")
+    return Frames(order, interval)

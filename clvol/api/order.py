@@ -10,10 +10,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from clvol.api.resuming import check_same, resumable, what_is_left
 from clvol.base.arguments import check_seed, positive
 from clvol.base.progress import Glance, Progress
 from clvol.device.device import open_device
 from clvol.errors import OptionError, shown
+from clvol.picture.merging import merge
 from clvol.planning import registry
 from clvol.planning.choices import Choices
 from clvol.planning.plan import Plan
@@ -63,6 +65,7 @@ class Order:
     transparent: bool
     device: str | None
     pool: int | None
+    resumed: Result | None
 
     @classmethod
     def of(cls, function: str, scene: object, given: Mapping[str, Any]) -> Order:
@@ -92,11 +95,14 @@ class Order:
             raise OptionError("target_error and samples exclude each other", hint="spp says how many at most")
         spp, time_limit = given["spp"], given["time_limit"]
         first, count = _sample_range(scene, spp, time_limit, given["samples"])
+        resumed = None
+        if given["resume"] is not None:
+            resumed = resumable(given["resume"], piloted, choices.target_error, given["samples"])
+            first, count = what_is_left(resumed, count)
         seed = check_seed(scene.seed if given["seed"] is None else given["seed"])
         extent = first, count, spp, seed, time_limit
-        return cls(
-            scene, asked, choices, piloted, *extent, *view, transparent, given["device"], given["pool"]
-        )
+        where = given["device"], given["pool"]
+        return cls(scene, asked, choices, piloted, *extent, *view, transparent, *where, resumed)
 
     def open(self, callback: ProgressCallback | None, profiler: Profiler | None = None) -> Opened:
         """Plan it, and make it ready on the device; `callback` is told of a pilot."""
@@ -114,6 +120,8 @@ class Order:
             reasons = dict.fromkeys(found.names, "chosen by the pilot")
             plan = plan.having(self.choices.but(**found.names), reasons)
         session = Session.for_plan(device, self.scene, plan, self.seed, self.pool, spent, profiler)
+        if self.resumed is not None:
+            check_same(self.resumed, session)
         session.describe()
         session.warn(self.asked)
         return Opened(self, session, found)
@@ -155,16 +163,17 @@ class Opened:
             render = TargetRender(session, target, order.spp)
             yield from render.steps(order.time_limit, callback, urgency)
             return
-        total = order.count if order.count < MAX_SAMPLES else None
+        had = 0 if order.resumed is None else order.resumed.samples[1]
+        total = had + order.count if order.first + order.count < MAX_SAMPLES else None
         for done in session.passes(order.first, order.count, order.time_limit, urgency):
             if callback is not None:
-                look = partial(make_result, session, order.first, done, final=False)
-                with Glance(look, callback) as glance:
-                    callback(Progress(done, total, session.seconds, order.time_limit, glance=glance))
+                with Glance(partial(self.result, done, final=False), callback) as glance:
+                    so_far = had + done, total, session.seconds, order.time_limit
+                    callback(Progress(*so_far, glance=glance))
             yield done
 
     def result(self, done: int, final: bool = True) -> Result:
-        """The picture at so many samples."""
+        """The picture at so many samples, and those that it goes on from."""
         order = self.order
         result = make_result(self.session, order.first, done, final)
         if order.choices.target_error is not None:
@@ -180,7 +189,7 @@ class Opened:
             }
             if final:
                 log.info("repeat with: %s", repeat)
-        return result
+        return result if order.resumed is None else merge([order.resumed, result])
 
     def _other_options(self, done: int) -> dict[str, Any]:
         """What was asked for beside what the pilot chose, as options of the command line."""

@@ -17,6 +17,7 @@ from clvol.rendering.profiler import Profiler, timed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from os import PathLike
 
     from clvol.base.progress import ProgressCallback
     from clvol.picture.result import Result
@@ -53,6 +54,7 @@ def render(
     device: str | None = None,
     progress: bool | ProgressCallback = False,
     samples: tuple[int, int] | None = None,
+    resume: Result | str | PathLike[str] | None = None,
     pool: int | None = None,
     profile: bool = False,
 ) -> Result:
@@ -99,6 +101,9 @@ def render(
         `clvol.base.progress.Progress` records: how far the render is, its ``image`` so far, its ``noise``.
     samples
         (first, count): render only these of the samples. Results of disjoint ranges `merge`.
+    resume
+        A picture to go on from, of this scene and seed: a `Result`, or an .exr that has one. Its samples
+        count towards `spp`, those that it lacks are rendered, and the result has all.
     pool
         Paths in flight, for measurements. The picture does not depend on it.
     profile
@@ -124,6 +129,9 @@ def render(
     profiler = Profiler() if profile else None
     with bar as callback:
         opened = order.open(callback, profiler)
+        if order.resumed is not None and not order.count:
+            order.resumed.stats["interrupted"] = False
+            return order.resumed
         with interruptible() as interrupt:
             interrupt.heed(patience=2)
             done = 0

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import OpenImageIO as oiio  # noqa: N813
 
+from clvol.base.memory import available_memory, format_bytes
+
 MAX_PIXELS = 2**27
 """16,384 x 8,192: as an environment 1.6 GB of texels and 0.5 GB of tables, here and again on the device."""
 _END, _STUFFED, _FILL = 0xD9, 0x00, 0xFF
@@ -67,6 +69,11 @@ def _read(opened: Any, path: str, channels: int | None) -> Stored:
     if spec.depth > 1:
         raise UnreadableError("it has several layers")
     count = min(spec.nchannels, channels or spec.nchannels)
+    size, free = 4 * spec.width * spec.height * count, available_memory()
+    if free is not None and size > free:
+        raise UnreadableError(
+            f"it takes {format_bytes(size)} of memory, of which {format_bytes(free)} are free"
+        )
     pixels = opened.read_image(0, 0, 0, count, oiio.FLOAT)
     if pixels is None:
         raise UnreadableError(_reason(opened))

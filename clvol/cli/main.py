@@ -10,6 +10,7 @@ import click
 from clvol.cli.compare import compare
 from clvol.cli.devices import devices
 from clvol.cli.info import info
+from clvol.cli.merge import merge
 from clvol.cli.messages import OneLineErrors
 from clvol.cli.ray import ray
 from clvol.cli.render import render
@@ -22,6 +23,7 @@ Examples:
   clvol render scenes/fire.vdb -o fire.png
   clvol scene scenes/fire.vdb -o fire.xml
   clvol render scenes/fire.xml -o fire.exr
+  clvol merge a.exr b.exr -o fire.exr
   clvol compare scenes/smoke.xml --techniques delta,spectral -o report/
   clvol selftest scenes/smoke.xml --quick
   clvol ray scenes/smoke.xml 100 60
@@ -45,7 +47,7 @@ def main(ctx: click.Context) -> None:
         click.echo(ctx.get_help())
 
 
-for command in (render, scene, info, devices, selftest, ray, compare):
+for command in (render, scene, merge, info, devices, selftest, ray, compare):
     main.add_command(command)
 
 if __name__ == "__main__":

@@ -56,6 +56,7 @@ Examples:
   clvol render scenes/fire.xml -o fire.exr --technique weighted-delta --majorant-scale 0.8
   clvol render scenes/smoke.xml -o smoke.exr --aov cells --aov largest_weight
   clvol render scenes/room.xml -o room.exr --profile --trace room.json
+  clvol render scenes/cloud.xml -o cloud.exr --resume --spp 1024
 """
 
 
@@ -112,6 +113,11 @@ class RenderCommand(ExplainedCommand):
     type=SampleRange(),
     metavar="FIRST,COUNT",
     help="Only COUNT samples of each pixel, from number FIRST on, instead of the first --spp.",
+)
+@click.option(
+    "--resume",
+    is_flag=True,
+    help="Go on where the first .exr ended, if it is there: its samples count towards --spp.",
 )
 @click.option("--quality", type=Quality(), help="How much noise is left; good for volumes by default.")
 @positive_option(
@@ -171,6 +177,7 @@ def render(
     _check_files(scene, first, trace, shown, bool(options["aov"]))
     console, profiled = error_console(), options.pop("profile")
     options |= extent | {"profile": profiled or trace is not None}
+    options["resume"] = _picture_to_go_on_from(outputs, frames is not None) if options["resume"] else None
     painter = Painter(asked, options, shown, trace, quiet, console)
     with logging_to(console, verbose):
         if frames is not None:
@@ -245,6 +252,16 @@ class Painter:
         for failure in failures.values():
             raise failure
         exit_by(result.stats["interrupted"])
+
+
+def _picture_to_go_on_from(outputs: Sequence[str], series: bool) -> str | None:
+    """The first output that has samples; None where it is not there yet."""
+    if series:
+        raise click.UsageError("--resume goes on with one picture; of frames, those that are there are kept")
+    first = next((output for output in outputs if output.lower().endswith(".exr")), None)
+    if first is None:
+        raise click.UsageError("--resume needs an .exr to go on from")
+    return first if os.path.lexists(first) else None
 
 
 def _check_room(loaded: Scene, outputs: Sequence[str], options: dict[str, Any]) -> None:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
-from clvol.picture import image_io
+import numpy as np
+
+from clvol.picture import image_io, kept_sums
 from clvol.picture.formats import component_of, is_linear
 
 if TYPE_CHECKING:
-    import numpy as np
-
+    from clvol.picture.estimate import Estimate, Ranges
     from clvol.picture.view_transform import View
+
+RECORD = "clvol:result"
+"""The attribute of an .exr with all that its planes do not say."""
 
 
 class Pictured(Protocol):
@@ -20,6 +26,10 @@ class Pictured(Protocol):
     variance: np.ndarray
     aovs: dict[str, np.ndarray]
     metadata: dict[str, Any]
+    stats: dict[str, Any]
+    samples: tuple[int, int]
+    ranges: Ranges
+    estimate: Estimate
     component_format: str | None
 
     @property
@@ -41,19 +51,42 @@ def encode_result(result: Pictured, suffix: str, view: View, component: str | No
     """
     numbers = component_of(suffix, component, result.component_format)
     if suffix == ".exr":
-        return image_io.encode_exr(_channels(result), result.metadata | {"dof": result.dof}, numbers)
+        metadata = result.metadata | {"dof": result.dof, RECORD: _record(result, numbers)}
+        return image_io.encode_exr(_channels(result, numbers), metadata, numbers)
     if is_linear(numbers):
         return image_io.encode_linear(suffix, result.image, result.alpha, result.metadata)
     view = view.resolved().with_stops(result.image)
     return image_io.encode_display(suffix, result.image, result.alpha, result.metadata, view, numbers)
 
 
-def _channels(result: Pictured) -> dict[str, np.ndarray]:
+def _record(result: Pictured, component: str) -> str:
+    """What a file's planes do not say of a result, for `clvol.picture.loading`."""
+    said = {
+        "metadata": result.metadata,
+        "stats": result.stats,
+        "samples": result.samples[1],
+        "ranges": result.ranges,
+        "sums": kept_sums.described(result.estimate, component == "float16"),
+        "component_format": result.component_format,
+    }
+    return json.dumps(said, default=_plain)
+
+
+def _plain(value: Any) -> Any:
+    """A value that JSON does not know as one that it does."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    return dict(value) if isinstance(value, Mapping) else str(value)
+
+
+def _channels(result: Pictured, component: str) -> dict[str, np.ndarray]:
     """Every picture of a result, plane by plane; alpha beside the colours that are multiplied by it."""
     layers = {"": result.image}
     if result.alpha is not None:
         layers[image_io.ALPHA] = result.alpha
     layers |= {"variance": result.variance} | result.aovs
+    if component != "float16":
+        layers |= kept_sums.layers_of(result.estimate)
     channels: dict[str, np.ndarray] = {}
     for name, image in layers.items():
         channels |= image_io.split_channels(name, image)

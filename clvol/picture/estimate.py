@@ -10,12 +10,15 @@ variance found is then too large by minus the mean covariance of two parts.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NoReturn
 
 import numpy as np
 
 from clvol.errors import OptionError
+
+Ranges = tuple[tuple[int, int], ...]
+"""Sample ranges as (first, count), ascending, disjoint, not touching."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +136,7 @@ class Replicates:
 
 @dataclass(frozen=True, eq=False)
 class Uneven:
-    """Means over samples of which each pixel has a number of its own.
+    """Means that no further samples can be added to, as where each pixel has a number of samples of its own.
 
     Parameters
     ----------
@@ -142,27 +145,28 @@ class Uneven:
     counts : int64 (pixels,)
     dof : int
         Least degrees of freedom of a pixel's variance.
+    reason, hint : str
+        Why that is, and what helps.
     """
 
     mean: np.ndarray
     variance: np.ndarray
     counts: np.ndarray
     dof: int
+    reason: str = "results of a target_error do not merge"
+    hint: str = "ask for a lower target_error, or render sample ranges without one"
 
     def mean_and_variance(self) -> tuple[np.ndarray, np.ndarray]:
         """As they are."""
         return self.mean, self.variance
 
     def plus(self, other: Estimate) -> NoReturn:
-        """No: numbers of samples that were chosen for one picture do not add up."""
-        raise OptionError(
-            "results of a target_error do not merge",
-            hint="ask for a lower target_error, or render sample ranges without one",
-        )
+        """No: OptionError."""
+        raise OptionError(self.reason, hint=self.hint)
 
     def reshaped(self, *shape: int) -> Uneven:
         """The same in another shape, broadcast to it."""
-        return Uneven(_fit(self.mean, shape), _fit(self.variance, shape), self.counts, self.dof)
+        return replace(self, mean=_fit(self.mean, shape), variance=_fit(self.variance, shape))
 
 
 Estimate = Moments | Replicates | Uneven

@@ -39,6 +39,8 @@ ALPHA = "alpha"
 """The picture of that name is channel A of a file."""
 _COLOURS = frozenset("RGBA")
 """Channels, of any layer of colours, that may be half floats; errors and depths need more digits."""
+HALVED = "deviation."
+"""Layers whose names begin so are half floats: numbers of the size of 1."""
 COLOUR_LAYERS = ("", "denoised")
 
 
@@ -64,7 +66,7 @@ def encode_exr(
     component : of the channels of colour and alpha, "float16" or "float32"; the others are float32.
     """
     pixels = np.stack([np.asarray(plane, np.float32) for plane in channels.values()], axis=-1)
-    halves = [component == "float16" and _is_colour(name) for name in channels]
+    halves = [name.startswith(HALVED) or (component == "float16" and _is_colour(name)) for name in channels]
     if any(halves):
         pixels[..., halves] = _as_half(pixels[..., halves])
     exr_metadata = {

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from functools import reduce
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from clvol.errors import OptionError, shown
-from clvol.picture.result import Ranges, Result, said_ranges
+from clvol.picture.estimate import Uneven
+from clvol.picture.result import Result, said_ranges
 
 if TYPE_CHECKING:
-    from clvol.picture.estimate import Estimate
+    from collections.abc import Mapping, Sequence
+
+    from clvol.picture.estimate import Estimate, Ranges
 
 _PER_RUN = frozenset(
     {"spp", "samples", "seconds", "device", "time_limit", "interrupted", "pilot", "pilot_reason", "repeat"}
@@ -33,7 +36,7 @@ def merge(results: Iterable[Result]) -> Result:
     Parameters
     ----------
     results
-        At least one, as `clvol.render` returned them, in any order.
+        At least one, as `clvol.render` and `clvol.load_result` returned them, in any order.
 
     Returns
     -------
@@ -55,7 +58,7 @@ def merge(results: Iterable[Result]) -> Result:
         if not isinstance(one, Result):
             raise OptionError(
                 f"merge takes what clvol.render returns, not {shown(one)}",
-                hint="files do not hold the sums that it needs",
+                hint="clvol.load_result reads what was saved",
             )
     results.sort(key=lambda result: result.ranges)
     for other in results[1:]:
@@ -78,19 +81,29 @@ def merge(results: Iterable[Result]) -> Result:
 
 def _check_same_render(one: Result, other: Result) -> None:
     """Raise OptionError where the two are not samples of the same picture."""
-    pairs: dict[str, tuple[Any, Any]] = {
-        "size": (one.image.shape[1::-1], other.image.shape[1::-1]),
-        "target_error": (one.metadata.get("target_error"), other.metadata.get("target_error")),
-        "aovs": (sorted(one.aovs), sorted(other.aovs)),
-    }
-    for key in sorted((one.metadata.keys() | other.metadata.keys()) - _PER_RUN):
-        pairs[key] = (one.metadata.get(key), other.metadata.get(key))
-    for key, (ours, theirs) in pairs.items():
+    size = {"size": (one.image.shape[1::-1], other.image.shape[1::-1])}
+    aovs = {"aovs": (sorted(one.aovs), sorted(other.aovs))}
+    for key, (ours, theirs) in (size | aovs | differences(one.metadata, other.metadata)).items():
         if ours != theirs:
             raise OptionError(
                 f"cannot merge results of a different {key}: {ours!r} and {theirs!r}",
                 hint="only sample ranges of the same render can be merged",
             )
+    for result in (one, other):
+        if isinstance(result.estimate, Uneven):
+            result.estimate.plus(result.estimate)  # says why not
+
+
+def differences(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
+    """Metadata that must be the same in results that merge and are not: those of both.
+
+    A scene is known by its digest, wherever its file was.
+    """
+    digest = one.get("digest")
+    known = {"scene"} if digest and digest == other.get("digest") else set()
+    keys = sorted((one.keys() | other.keys()) - _PER_RUN - known)
+    pairs = {key: (one.get(key), other.get(key)) for key in keys}
+    return {key: (ours, theirs) for key, (ours, theirs) in pairs.items() if ours != theirs}
 
 
 def _joined(spans: Sequence[tuple[int, int]]) -> Ranges:

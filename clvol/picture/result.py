@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from clvol.base.extras import need
 from clvol.errors import OptionError
+from clvol.picture import image_io
 from clvol.picture.encoding import encode_result
-from clvol.picture.estimate import Estimate, error_bias
+from clvol.picture.estimate import Estimate, Ranges, error_bias
 from clvol.picture.image_io import ALPHA
 from clvol.picture.saving import check_picture, save_all
 from clvol.picture.view_transform import View
@@ -23,10 +25,9 @@ from clvol.picture.view_transform import View
 if TYPE_CHECKING:
     from os import PathLike
 
-    from clvol.picture.profile import Profile
+    import numpy.typing as npt
 
-Ranges = tuple[tuple[int, int], ...]
-"""Sample ranges as (first, count), ascending, disjoint, not touching."""
+    from clvol.picture.profile import Profile
 
 
 def relative_noise(image: np.ndarray, variance: np.ndarray, dof: float = math.inf) -> float:
@@ -163,6 +164,25 @@ class Result:
     def _repr_png_(self) -> bytes:
         """The picture as a PNG, tone-mapped: how a notebook shows a result."""
         return self.encode(".png")
+
+    def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> np.ndarray:
+        """The image: ``numpy.asarray(result)``."""
+        if dtype is not None and np.dtype(dtype) != self.image.dtype:
+            if copy is False:
+                raise ValueError(f"the image is {self.image.dtype}: as {np.dtype(dtype)} it is a copy")
+            return self.image.astype(dtype)
+        return self.image.copy() if copy else self.image
+
+    @property
+    def display(self) -> np.ndarray:
+        """What a .png shows: uint8 (height, width, 3), or with alpha (height, width, 4)."""
+        view = View().resolved().with_stops(self.image)
+        shown: np.ndarray = np.rint(255 * image_io.shown_pixels(self.image, self.alpha, view))
+        return shown.astype(np.uint8)
+
+    def to_pil(self) -> Any:
+        """`display` as a ``PIL.Image.Image``; OptionError where Pillow is missing."""
+        return need("PIL.Image", "Result.to_pil", "report").fromarray(self.display)
 
     @property
     def alpha(self) -> np.ndarray | None:

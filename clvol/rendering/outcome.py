@@ -14,6 +14,7 @@ from clvol.version import __version__
 
 if TYPE_CHECKING:
     from clvol.picture.estimate import Estimate
+    from clvol.planning.plan import Plan
     from clvol.rendering.session import Session
 
 log = logging.getLogger("clvol")
@@ -37,7 +38,7 @@ def make_result(session: Session, first: int, count: int, final: bool = True) ->
     pictures = _pictures(session, samples, estimate)
     aovs = {name: values.reshape(*shape, *values.shape[1:]) for name, values in pictures.items()}
     result = Result.from_estimate(
-        estimate.reshaped(*shape, 3), (first, count), aovs, stats, _metadata(session, first, samples)
+        estimate.reshaped(*shape, 3), (first, count), aovs, stats, metadata_of(session, first, samples)
     )
     result.component_format = session.prepared.scene.film.component_format
     if final:
@@ -59,8 +60,8 @@ def _warn_of_unseen(session: Session, result: Result) -> None:
         )
 
 
-def _metadata(session: Session, first: int, samples: np.ndarray) -> dict[str, Any]:
-    """How the picture was made."""
+def metadata_of(session: Session, first: int, samples: np.ndarray) -> dict[str, Any]:
+    """How a picture of so many samples a pixel, from number `first` on, is made."""
     scene, plan = session.prepared.scene, session.plan
     biased, scale = plan.biased, plan.choices.majorant_scale
     apart = plan.settled.channels_apart if plan.settled and plan.mixes_far_channels else None
@@ -90,14 +91,19 @@ def _repairs(session: Session) -> dict[str, str]:
     return {"sanitized": "; ".join(said)} if said else {}
 
 
+def picture_names(plan: Plan) -> list[str]:
+    """The pictures that a result has beside the image."""
+    more = [layout.ALPHA] * plan.features.alpha + ["samples"] * plan.pixel_list
+    return list(dict.fromkeys(("lookups", *plan.choices.aov, *more)))
+
+
 def _pictures(session: Session, samples: np.ndarray, estimate: Estimate) -> dict[str, np.ndarray]:
     """Look-ups and what `aov` asks for: means per sample, and the largest weight; float32 (pixels[, 3])."""
     film, plan = session.wavefront.film, session.plan
     sums, peaks, nothing = film.counts(), film.peaks_by_pixel(), np.zeros(film.pixels)
     counts = {name: total / np.maximum(samples, 1) for name, total in sums.items()}
     found = {}
-    more = [layout.ALPHA] * plan.features.alpha + ["samples"] * plan.pixel_list
-    for name in dict.fromkeys(("lookups", *plan.choices.aov, *more)):
+    for name in picture_names(plan):
         if name == layout.ALPHA:
             values = _alpha(session, np.maximum(samples, 1) * plan.jobs_per_sample)
         elif name in registry.FIRST_HIT:

@@ -268,6 +268,7 @@ def test_options_reach_render_unchanged(scene: str, tmp_path: Path, monkeypatch:
         "spp": None,
         "samples": None,
         "time_limit": 2.0,
+        "resume": None,
         "target_error": None,
         "seed": 7,
         "device": "pocl",

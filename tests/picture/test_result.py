@@ -168,7 +168,7 @@ def test_results_of_another_size_are_refused() -> None:
         ([], "nothing to merge"),
         (
             ["a.exr", make_result(0, 2)],
-            "merge takes what clvol.render returns, not 'a.exr'; files do not hold",
+            "merge takes what clvol.render returns, not 'a.exr'; clvol.load_result reads",
         ),
         ("a.exr", "merge takes what clvol.render returns"),
         (make_result(0, 2), "a list of results"),
