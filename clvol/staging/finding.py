@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from clvol.errors import VolumeError
+from clvol.volumes.grid import STAGGERED
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -86,7 +87,9 @@ def _remaining(
     listed: Sequence[Listed], readable: Sequence[str], found: Mapping[str, str | None], where: str
 ) -> str:
     """The density where no grid is called so: the only one that is left, else what burns."""
-    rest = [name for name in readable if name not in found.values() and plain(name) not in MOTION]
+    vectors = [grid.name for grid in listed if grid.channels == 3 or grid.kind == STAGGERED]
+    used = {*found.values(), *vectors}
+    rest = [name for name in readable if name not in used and plain(name) not in MOTION]
     if len(rest) == 1:
         return rest[0]
     burning = found["flame"] or found["temperature"]

@@ -55,7 +55,13 @@ class Grids:
             return cls(Found(""), Field("", {}, ConstVolume((0.0,))), None, None, None)
         asked = {kind: getattr(options, kind) for kind in ("density", "temperature", "flame", "colour")}
         found = find_grids(listed, asked, source.name)
-        fields = {name: source.open(name) for name in dict.fromkeys(vars(found).values()) if name is not None}
+        sane = {"sanitize": True} if options.sanitize else {}
+        fog = {"level_set": options.level_set} if options.level_set else {}
+        fields = {
+            name: source.open(name, sane | (fog if name == found.density else {}))
+            for name in dict.fromkeys(vars(found).values())
+            if name is not None
+        }
         others = (found.temperature, found.flame, found.colour)
         grids = cls(found, fields[found.density], *(None if n is None else fields[n] for n in others))
         grids.check(source.name)

@@ -167,6 +167,8 @@ OPTIONS: dict[str, Option] = {
     "temperature": Option(text, "GRID", "Grid of the temperature; none: leave it out."),
     "flame": Option(text, "GRID", "Grid of what glows; none: leave it out."),
     "colour": Option(text, "GRID", "Grid of the colour, as Cd; none: leave it out.", ("--color",)),
+    "level_set": Option(choice("fog"), "fog", "Take the density for a level set, and fill it with fog."),
+    "sanitize": Option(flag, "", "Take NaN and slightly negative samples as 0, and count them."),
     "density_scale": Option(
         number(0, 1e15, above=True),
         "X",

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from clvol.scene.records import ConstVolume, GridVolume, Volume
 from clvol.scene.transforms import scale
 from clvol.staging.coarse import Coarse, coarse, extremes
 from clvol.volumes import Listed, check_finite, list_grids
-from clvol.volumes.grid import DenseGrid
+from clvol.volumes.grid import DenseGrid, Grid
 
 if TYPE_CHECKING:
     from clvol.base.output_files import StrPath
@@ -57,19 +58,19 @@ class Source:
         """Its grids."""
         return [Listed(name) for name in self.arrays] if self.path is None else list_grids(self.path)
 
-    def open(self, name: str) -> Field:
-        """Read one grid, and place it."""
+    def open(self, name: str, use: Mapping[str, Any] = MappingProxyType({})) -> Field:
+        """Read one grid, and place it; `use`: parameters of its plugin on what its samples are taken for."""
         if self.path is None:
             plugin = {"type": "gridvolume", "data": self.arrays[name]}
         else:
             plugin = {"type": "gridvolume", "filename": str(self.path)}
             plugin |= {"grid": name} if name else {}
-        return Field.of(name, plugin, self.grids)
+        return Field.of(name, plugin | dict(use), self.grids)
 
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """One grid of a volume: the plugin that gives it to a scene, and what and where it is.
+    """One grid of a volume: the plugin that gives it to a scene, and what and where it is, without NaN.
 
     `cubic`: its file says nothing of its size, and its voxels are taken as cubes.
     """
@@ -87,7 +88,8 @@ class Field:
             return cls(name, plugin, volume)
         grid = volume.grid
         more: dict[str, Any] = {}
-        check_finite(grid, "the volume")
+        mended = _without_nan(grid) if volume.sanitize else grid
+        check_finite(mended, "the volume")
         cubic = False
         if isinstance(grid, DenseGrid) and grid.index_to_world is None:
             if np.array_equal(grid.box, UNIT_BOX):
@@ -97,10 +99,12 @@ class Field:
             else:
                 more = {"use_grid_bbox": True}
         if isinstance(grid, DenseGrid) and grid.index_to_world is None and "data" in plugin:
-            more["data"] = grid.values  # checked and without masks: what was said of it is said once
+            more["data"] = grid  # without masks: what was said of it is said once
         if more:
             plugin = plugin | more
             volume = load_plugin(plugin, grids)
+        if mended is not grid:
+            volume = replace(volume, grid=mended)
         return cls(name, plugin, volume, cubic)
 
     @property
@@ -136,3 +140,10 @@ class Field:
         points = self.means.filled()
         matrix = self.volume.index_to_world
         return extremes(points @ matrix[:3, :3].T + matrix[:3, 3])
+
+
+def _without_nan(grid: Grid) -> Grid:
+    """The grid with 0 for NaN, to be measured; the scene mends its own, and says so."""
+    names = ("values",) if isinstance(grid, DenseGrid) else ("leaf_values", "tile_values", "background")
+    stored: dict[str, Any] = {name: getattr(grid, name) for name in names}
+    return replace(grid, **{name: np.where(np.isnan(of), 0, of) for name, of in stored.items()})

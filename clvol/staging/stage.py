@@ -243,6 +243,8 @@ def volume_scene(
     temperature: str | None = None,
     flame: str | None = None,
     colour: str | None = None,
+    level_set: str | None = None,
+    sanitize: bool | None = None,
     density_scale: float | None = None,
     albedo: float | Sequence[float] | None = None,
     anisotropy: float | None = None,
@@ -268,10 +270,14 @@ def volume_scene(
     Parameters
     ----------
     volume
-        A file's name, an array [z, y, x], or a dict of arrays by name, as
+        A file's name, an array [z, y, x], a grid of `load_volume`, or a dict of these by name, as
         ``{"density": a, "temperature": b}``.
     density, temperature, flame, colour
         Names of grids, which are found by their usual names otherwise. "none" leaves one out.
+    level_set
+        "fog" takes the density for a level set, and fills it with fog.
+    sanitize
+        Take NaN and slightly negative samples as 0. A warning counts them.
     density_scale
         Extinction of density 1. By default the optical thickness is about 8 at the 90th percentile of the
         rays that the camera sends through the volume.

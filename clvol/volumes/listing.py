@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Listed:
     """What a file says of one of its grids.
 
@@ -28,25 +28,16 @@ class Listed:
     unreadable : why it cannot be read, "" where it can.
     channels : values of a sample, 1 or 3; 0 where only reading tells, or it cannot be read.
     kind : what its values are, "fog volume", "level set" or "staggered", "" where the file does not say.
-    world_box : float64 (2, 3), a box in the world round its active samples; None where only reading tells.
     """
 
     name: str
     unreadable: str = ""
     channels: int = 0
     kind: str = ""
-    world_box: np.ndarray | None = None
 
 
 def _sparse(path: str | os.PathLike[str]) -> list[Listed]:
-    found = []
-    for grid in list_sparse(path):
-        box = None
-        if grid.active_box is not None and grid.index_to_world is not None:
-            empty = (grid.active_box[0] > grid.active_box[1]).any()
-            box = None if empty else box_of(grid.active_box, grid.index_to_world)
-        found.append(Listed(grid.name, grid.unreadable, grid.channels, grid.kind, box))
-    return found
+    return [Listed(grid.name, grid.unreadable, grid.channels, grid.kind) for grid in list_sparse(path)]
 
 
 def _npz(path: str | os.PathLike[str]) -> list[Listed]:

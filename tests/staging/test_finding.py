@@ -27,6 +27,11 @@ def test_the_only_grid_left_is_the_density(names: tuple[str, ...]) -> None:
     assert found(*names).density == names[0]
 
 
+def test_vectors_are_no_density() -> None:
+    listed = [Listed("scan"), Listed("speed", channels=3), Listed("flow", kind="staggered")]
+    assert find_grids(listed, {}, "scan.vdb").density == "scan"
+
+
 def test_what_burns_is_the_density_where_there_is_none() -> None:
     assert found("temperature", "flame") == Found("flame", "temperature", "flame")
 
