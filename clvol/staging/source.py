@@ -145,5 +145,6 @@ class Field:
 def _without_nan(grid: Grid) -> Grid:
     """The grid with 0 for NaN, to be measured; the scene mends its own, and says so."""
     names = ("values",) if isinstance(grid, DenseGrid) else ("leaf_values", "tile_values", "background")
-    stored: dict[str, Any] = {name: getattr(grid, name) for name in names}
-    return replace(grid, **{name: np.where(np.isnan(of), 0, of) for name, of in stored.items()})
+    stored = {name: getattr(grid, name) for name in names}
+    mended: dict[str, Any] = {name: np.where(np.isnan(of), 0, of) for name, of in stored.items()}
+    return replace(grid, **mended)
