@@ -15,6 +15,7 @@ from clvol.base.arguments import check_seed, positive
 from clvol.base.progress import Glance, Progress
 from clvol.device.device import open_device
 from clvol.errors import OptionError, shown
+from clvol.picture.denoising import FEATURES, need_denoiser
 from clvol.picture.merging import merge
 from clvol.planning import registry
 from clvol.planning.choices import Choices
@@ -49,6 +50,7 @@ class Order:
     piloted : a pilot is to choose technique, transmittance and majorant.
     first, count : samples of each pixel; `spp` is what was given instead.
     transparent : the background was asked to be so.
+    denoise : its results get their layer `denoised`.
     """
 
     scene: Scene
@@ -63,6 +65,7 @@ class Order:
     sensor: int | None
     size: tuple[int, int] | None
     transparent: bool
+    denoise: bool
     device: str | None
     pool: int | None
     resumed: Result | None
@@ -93,6 +96,7 @@ class Order:
             choices = choices.but(technique="auto")  # the scene's own technique too is put to the test
         if choices.target_error is not None and given["samples"] is not None:
             raise OptionError("target_error and samples exclude each other", hint="spp says how many at most")
+        denoise = _denoises(given["denoise"])
         spp, time_limit = given["spp"], given["time_limit"]
         first, count = _sample_range(scene, spp, time_limit, given["samples"])
         resumed = None
@@ -102,13 +106,17 @@ class Order:
         seed = check_seed(scene.seed if given["seed"] is None else given["seed"])
         extent = first, count, spp, seed, time_limit
         where = given["device"], given["pool"]
-        return cls(scene, asked, choices, piloted, *extent, *view, transparent, *where, resumed)
+        return cls(scene, asked, choices, piloted, *extent, *view, transparent, denoise, *where, resumed)
 
     def open(self, callback: ProgressCallback | None, profiler: Profiler | None = None) -> Opened:
         """Plan it, and make it ready on the device; `callback` is told of a pilot."""
         started = time.perf_counter()
         with timed(profiler, "plan"):
             plan = Plan.of(self.scene, self.choices)
+            choices = self.choices
+            if self.denoise and plan.guides_denoiser:
+                choices = choices.but(aov=tuple(dict.fromkeys((*choices.aov, *FEATURES))))
+                plan = plan.having(choices)
         spent = time.perf_counter() - started
         with timed(profiler, "device"):
             device = open_device(self.device)
@@ -118,7 +126,7 @@ class Order:
                 found = self._pilot(device, callback)
             log.info("pilot: %s; %s", ", ".join(f"{k} {v}" for k, v in found.names.items()), found.reason)
             reasons = dict.fromkeys(found.names, "chosen by the pilot")
-            plan = plan.having(self.choices.but(**found.names), reasons)
+            plan = plan.having(choices.but(**found.names), reasons)
         session = Session.for_plan(device, self.scene, plan, self.seed, self.pool, spent, profiler)
         if self.resumed is not None:
             check_same(self.resumed, session)
@@ -189,7 +197,9 @@ class Opened:
             }
             if final:
                 log.info("repeat with: %s", repeat)
-        return result if order.resumed is None else merge([order.resumed, result])
+        if order.resumed is not None:
+            result = merge([order.resumed, result])
+        return result.denoise() if order.denoise else result
 
     def _other_options(self, done: int) -> dict[str, Any]:
         """What was asked for beside what the pilot chose, as options of the command line."""
@@ -211,6 +221,13 @@ class Opened:
             given["background"] = registry.TRANSPARENT
         size = None if order.size is None else "x".join(map(str, order.size))
         return given | {"sensor": order.sensor, "size": size, "seed": order.seed, "device": order.device}
+
+
+def _denoises(asked: bool) -> bool:
+    """Whether results are denoised; OptionError where they cannot be."""
+    if asked:
+        need_denoiser()
+    return bool(asked)
 
 
 def check_scene(function: str, scene: object) -> Scene:

@@ -49,6 +49,7 @@ def render(
     majorant_scale: float = 1.0,
     step: float | None = None,
     aov: Sequence[str] = (),
+    denoise: bool = False,
     time_limit: float | None = None,
     target_error: float | None = None,
     device: str | None = None,
@@ -88,6 +89,8 @@ def render(
     aov
         Names from `clvol.planning.registry.AOVS` to add to ``result.aovs``. They are means per sample
         ("largest_weight": maxima).
+    denoise
+        Add ``result.denoised``, to be looked at, by Open Image Denoise: the extra `denoise`.
     time_limit
         Seconds after which no new pass of samples is begun. Alone it replaces `spp`. Passes begun are
         finished, unless paths go on for more than 10 seconds (30 where no pass is finished yet).

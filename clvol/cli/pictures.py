@@ -42,6 +42,11 @@ class Stops(_OptionType):
 
 _OPTIONS = (
     click.option(
+        "--denoise",
+        is_flag=True,
+        help="Show the picture without its noise; an .exr has it as a layer beside the unbiased one.",
+    ),
+    click.option(
         "--exposure",
         type=Stops(),
         default=0.0,
@@ -59,7 +64,10 @@ _OPTIONS = (
 
 
 def picture_options(command: F) -> F:
-    """Options that say how pictures are shown and written; `Shown.taken` takes them."""
+    """Options that say how pictures are shown and written.
+
+    `Shown.taken` takes all but --denoise, which is an option of `clvol.render`.
+    """
     for option in reversed(_OPTIONS):
         command = option(command)
     return command

@@ -31,6 +31,7 @@ class Pictured(Protocol):
     ranges: Ranges
     estimate: Estimate
     component_format: str | None
+    denoised: np.ndarray | None
 
     @property
     def alpha(self) -> np.ndarray | None:
@@ -54,9 +55,18 @@ def encode_result(result: Pictured, suffix: str, view: View, component: str | No
         metadata = result.metadata | {"dof": result.dof, RECORD: _record(result, numbers)}
         return image_io.encode_exr(_channels(result, numbers), metadata, numbers)
     if is_linear(numbers):
-        return image_io.encode_linear(suffix, result.image, result.alpha, result.metadata)
-    view = view.resolved().with_stops(result.image)
-    return image_io.encode_display(suffix, result.image, result.alpha, result.metadata, view, numbers)
+        return image_io.encode_linear(suffix, *shown_layers(result), result.metadata)
+    image, alpha = shown_layers(result)
+    view = view.resolved().with_stops(image)
+    return image_io.encode_display(suffix, image, alpha, result.metadata, view, numbers)
+
+
+def shown_layers(result: Pictured) -> tuple[np.ndarray, np.ndarray | None]:
+    """Radiance and alpha that are shown: denoised where there is such."""
+    if result.denoised is None:
+        return result.image, result.alpha
+    alpha = result.denoised[..., 3] if result.denoised.shape[2] == 4 else None
+    return result.denoised[..., :3], alpha
 
 
 def _record(result: Pictured, component: str) -> str:
@@ -84,6 +94,8 @@ def _channels(result: Pictured, component: str) -> dict[str, np.ndarray]:
     layers = {"": result.image}
     if result.alpha is not None:
         layers[image_io.ALPHA] = result.alpha
+    if result.denoised is not None:
+        layers[image_io.DENOISED] = result.denoised
     layers |= {"variance": result.variance} | result.aovs
     if component != "float16":
         layers |= kept_sums.layers_of(result.estimate)

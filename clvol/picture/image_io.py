@@ -39,9 +39,11 @@ ALPHA = "alpha"
 """The picture of that name is channel A of a file."""
 _COLOURS = frozenset("RGBA")
 """Channels, of any layer of colours, that may be half floats; errors and depths need more digits."""
+DENOISED = "denoised"
+"""The layer of that name is the denoised picture."""
+_COLOUR_LAYERS = ("", DENOISED)
 HALVED = "deviation."
 """Layers whose names begin so are half floats: numbers of the size of 1."""
-COLOUR_LAYERS = ("", "denoised")
 
 
 def split_channels(name: str, image: np.ndarray) -> dict[str, np.ndarray]:
@@ -141,7 +143,7 @@ def shown_pixels(image: np.ndarray, alpha: np.ndarray | None, view: View) -> np.
 
 def _is_colour(name: str) -> bool:
     layer, _, channel = name.rpartition(".")
-    return layer in COLOUR_LAYERS and channel in _COLOURS
+    return layer in _COLOUR_LAYERS and channel in _COLOURS
 
 
 def _as_half(values: np.ndarray) -> np.ndarray:

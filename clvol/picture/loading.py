@@ -14,7 +14,7 @@ from clvol.base.image_reading import UnreadableError, read_stored
 from clvol.errors import OptionError, shown
 from clvol.picture import kept_sums
 from clvol.picture.encoding import RECORD
-from clvol.picture.image_io import ALPHA
+from clvol.picture.image_io import ALPHA, DENOISED
 from clvol.picture.result import Result
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def _place(label: str) -> int:
 
 def _result(said: Any, layers: dict[str, np.ndarray]) -> Result:
     """The result of a file's record and layers; KeyError, TypeError or ValueError where it is none."""
-    image, variance = layers.pop(""), layers.pop("variance")
+    image, variance, denoised = layers.pop(""), layers.pop("variance"), layers.pop(DENOISED, None)
     deviations = {name: layers.pop(name) for name in list(layers) if name.startswith(kept_sums.LAYER)}
     if image.shape != variance.shape or image.shape[2:] != (3,):
         raise ValueError("the picture has no three channels")
@@ -104,7 +104,7 @@ def _result(said: Any, layers: dict[str, np.ndarray]) -> Result:
     estimate = kept_sums.rebuilt(said["sums"], image, variance, deviations, layers.get("samples"))
     count = _whole(said["samples"])
     result = Result(image, variance, stats, layers, metadata, (ranges[0][0], count), estimate, ranges)
-    result.component_format = said.get("component_format")
+    result.component_format, result.denoised = said.get("component_format"), denoised
     return result
 
 

@@ -18,7 +18,18 @@ if TYPE_CHECKING:
     from clvol.picture.estimate import Estimate, Ranges
 
 _PER_RUN = frozenset(
-    {"spp", "samples", "seconds", "device", "time_limit", "interrupted", "pilot", "pilot_reason", "repeat"}
+    {
+        "denoised",
+        "spp",
+        "samples",
+        "seconds",
+        "device",
+        "time_limit",
+        "interrupted",
+        "pilot",
+        "pilot_reason",
+        "repeat",
+    }
 )
 """Metadata that may differ between results that merge; everything else must agree."""
 
@@ -159,7 +170,8 @@ def _merged_metadata(parts: Sequence[dict[str, Any]], spp: int) -> dict[str, Any
     """Metadata of the whole: the shared entries, the total of samples and seconds, every device used."""
     merged = {key: value for key, value in parts[0].items() if all(part.get(key) == value for part in parts)}
     merged["spp"] = spp
-    merged.pop("samples", None)
+    for name in ("samples", "denoised"):
+        merged.pop(name, None)
     seconds = [part["seconds"] for part in parts if "seconds" in part]
     if seconds:
         merged["seconds"] = sum(seconds)

@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from clvol.base.extras import need
 from clvol.errors import OptionError
-from clvol.picture import image_io
-from clvol.picture.encoding import encode_result
+from clvol.picture import denoising, image_io
+from clvol.picture.encoding import encode_result, shown_layers
 from clvol.picture.estimate import Estimate, Ranges, error_bias
 from clvol.picture.image_io import ALPHA
 from clvol.picture.saving import check_picture, save_all
@@ -83,6 +83,9 @@ class Result:
         Where the time went, of a render that was asked for it.
     component_format : str or None
         What the scene asks the numbers of its files to be, as "float16".
+    denoised : float32 (height, width, 3) or None
+        What `denoise` made of the image, with alpha (height, width, 4): to be looked at, and what is shown.
+        Nothing is measured in it.
     """
 
     image: np.ndarray
@@ -95,6 +98,7 @@ class Result:
     ranges: Ranges = ()
     profile: Profile | None = None
     component_format: str | None = None
+    denoised: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         self.ranges = self.ranges or (self.samples,)
@@ -162,7 +166,7 @@ class Result:
         return bool(crossed) and not self.stats.get("real_collisions", 0)
 
     def _repr_png_(self) -> bytes:
-        """The picture as a PNG, tone-mapped: how a notebook shows a result."""
+        """The picture as a PNG: how a notebook shows a result."""
         return self.encode(".png")
 
     def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> np.ndarray:
@@ -176,8 +180,7 @@ class Result:
     @property
     def display(self) -> np.ndarray:
         """What a .png shows: uint8 (height, width, 3), or with alpha (height, width, 4)."""
-        view = View().resolved().with_stops(self.image)
-        shown: np.ndarray = np.rint(255 * image_io.shown_pixels(self.image, self.alpha, view))
+        shown: np.ndarray = np.rint(255 * image_io.shown_pixels(*shown_layers(self), View().resolved()))
         return shown.astype(np.uint8)
 
     def to_pil(self) -> Any:
@@ -191,6 +194,20 @@ class Result:
         The share of paths that meet something.  The image is multiplied by it.
         """
         return self.aovs.get(ALPHA)
+
+    def denoise(self) -> Self:
+        """Add the layer `denoised`, by Open Image Denoise; returns the result itself.
+
+        The image, its variance and noise stay as they are.  AOVs albedo and normal guide it where there are
+        such; ``clvol.render(..., denoise=True)`` asks for them where they help.  `merge` leaves it out.
+
+        Raises OptionError, with the command that installs it, where the extra `denoise` is missing.
+        """
+        guides = {name: self.aovs[name] for name in denoising.FEATURES if name in self.aovs}
+        self.denoised = denoising.denoise(self.image, self.alpha, **guides)
+        by = f" with {' and '.join(guides)}" if guides else ""
+        self.metadata["denoised"] = f"{denoising.denoiser_name()}{by}"
+        return self
 
     def encode(
         self,
@@ -218,8 +235,9 @@ class Result:
         An EXR holds R, G, B, variance.R/G/B and every AOV as channels of one part; with alpha it is A, which
         colours are multiplied by.  Formats of floats (.hdr, .pfm, .tif with float32) hold linear radiance.
         The others hold what a display shows, through a view of the colour configuration: colours are divided
-        by alpha.  All carry the metadata that they have a place for.  An earlier file of that name is
-        replaced only once the new one is complete.
+        by alpha.  They show the denoised picture where there is one; an EXR has it as
+        denoised.R/G/B beside the image.  All carry the metadata that they have a place for.  An earlier file
+        of that name is replaced only once the new one is complete.
 
         Parameters
         ----------

@@ -222,6 +222,12 @@ class Decisions:
         return self.features.alpha and not self.opaque
 
     @property
+    def guides_denoiser(self) -> bool:
+        """Albedos and normals of what paths first meet tell more than the colours do."""
+        f = self.features
+        return f.reflecting or f.albedo_volumes or f.media > 1
+
+    @property
     def shown(self) -> frozenset[str]:
         """Pictures whose numbers are kept: those asked for, look-ups, and what others are made from."""
         of = {"null": ("tentative", "real"), "efficiency": ("cells",)}
