@@ -15,7 +15,7 @@ from clvol.scene.volume import largest_value, limited
 from clvol.volumes import check_coefficients, check_finite
 from clvol.volumes.grid import DenseGrid
 from clvol.volumes.proportional import proportional_channels
-from clvol.volumes.repair import sanitized
+from clvol.volumes.repair import sanitized, warn_of
 
 log = logging.getLogger("clvol")
 
@@ -120,6 +120,7 @@ def _sane(reader: Reader, volume: Volume, signed: bool = False) -> Volume:
     done = reader.library.sanitized
     if (id(volume.grid), signed) not in done:
         done[id(volume.grid), signed] = sanitized(volume.grid, signed)
+        warn_of(volume.grid, done[id(volume.grid), signed][1])
     if (id(volume), signed) not in done:
         grid, repairs = done[id(volume.grid), signed]
         done[id(volume), signed] = replace(volume, grid=grid, repairs=str(repairs))

@@ -16,7 +16,7 @@ from clvol.volumes.files import place
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
 from clvol.volumes.labelled import grid_from_labelled, is_labelled
 from clvol.volumes.level_set import USES, fog_of
-from clvol.volumes.read import SPARSE, read_sparse
+from clvol.volumes.read import read_sparse
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,7 +40,7 @@ def vdbvolume(reader: Reader) -> Volume:
     if not reader.has("filename"):
         reader.fail("a vdbvolume needs a filename")
     path = find_parameter(reader, "filename")
-    grid = _read(reader, path, reader.string("grid", "density"), read_sparse)
+    grid = _read(reader, path, reader.string("grid", "") if reader.has("grid") else None, read_sparse)
     if not isinstance(grid, SparseGrid):
         reader.fail(
             f"a vdbvolume reads OpenVDB and NanoVDB, not '{path.name}'", "filename", "use a gridvolume"
@@ -122,8 +122,6 @@ def _grid(reader: Reader) -> Grid:
     if inside is not None and name is not None:
         reader.fail(f"the filename names an array itself, '{inside}'", "grid", "give one of them")
     name = inside if name is None else name
-    if name is None and path.suffix.lower() in SPARSE:
-        name = "density"
     return _read(reader, path, name, read_volume)
 
 
@@ -131,8 +129,12 @@ def _read(reader: Reader, path: Path, name: str | None, read: Callable[[Path, st
     """A grid of a file, as a fog volume where that is asked for; it is read and made once per scene."""
     grids, use = reader.library.grids, reader.string("level_set", "", USES)
     resolved = path.resolve()
+    if name is None and (resolved, "density", "") in grids:
+        name = "density"
     if (resolved, name, "") not in grids:
-        grids[resolved, name, ""] = read(path, name)
+        grid = grids[resolved, name, ""] = read(path, name)
+        if isinstance(grid, SparseGrid):  # which may be named elsewhere, where it is not here
+            grids[resolved, grid.name, ""] = grid
     if (resolved, name, use) not in grids:
         grids[resolved, name, use] = fog_of(grids[resolved, name, ""])
     return grids[resolved, name, use]

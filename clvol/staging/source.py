@@ -17,7 +17,8 @@ from clvol.scene.records import ConstVolume, GridVolume, Volume
 from clvol.scene.transforms import scale
 from clvol.staging.coarse import Coarse, coarse, extremes
 from clvol.volumes import Listed, check_finite, list_grids
-from clvol.volumes.grid import DenseGrid, Grid
+from clvol.volumes.grid import DenseGrid
+from clvol.volumes.repair import sanitized
 
 if TYPE_CHECKING:
     from clvol.base.output_files import StrPath
@@ -88,7 +89,7 @@ class Field:
             return cls(name, plugin, volume)
         grid = volume.grid
         more: dict[str, Any] = {}
-        mended = _without_nan(grid) if volume.sanitize else grid
+        mended = sanitized(grid, signed=True)[0] if volume.sanitize else grid
         check_finite(mended, "the volume")
         cubic = False
         if isinstance(grid, DenseGrid) and grid.index_to_world is None:
@@ -140,11 +141,3 @@ class Field:
         points = self.means.filled()
         matrix = self.volume.index_to_world
         return extremes(points @ matrix[:3, :3].T + matrix[:3, 3])
-
-
-def _without_nan(grid: Grid) -> Grid:
-    """The grid with 0 for NaN, to be measured; the scene mends its own, and says so."""
-    names = ("values",) if isinstance(grid, DenseGrid) else ("leaf_values", "tile_values", "background")
-    stored = {name: getattr(grid, name) for name in names}
-    mended: dict[str, Any] = {name: np.where(np.isnan(of), 0, of) for name, of in stored.items()}
-    return replace(grid, **mended)

@@ -77,6 +77,23 @@ def entries_named(entries: Sequence[Entry], name: str, where: str) -> list[Entry
     return exact or alike or [entry for entry in entries if f"{entry.name}[0]" == name]
 
 
+def chosen(entries: Sequence[Entry], grid: str | int | None, where: str) -> list[Entry]:
+    """The entries that a name, a number, or no name at all means, the first of which is taken.
+
+    None : "density", or the only grid that there is.
+    """
+    if isinstance(grid, int):
+        return list(entries[grid : grid + 1]) if grid >= 0 else []
+    if grid is None and len(entries) == 1:
+        return list(entries)
+    return entries_named(entries, "density" if grid is None else grid, where)
+
+
+def missing(grid: str | int | None) -> str:
+    """For the error about a grid that is not there."""
+    return f"has no grid {'density' if grid is None else grid!r}"
+
+
 def listed_names(entries: Sequence[Named]) -> str:
     """For the hint of an error about a grid that is not there."""
     names = ", ".join(repr(entry.name) for entry in entries)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from clvol.errors import OptionError, shown
 from clvol.volumes.level_set import USES, fog_of
 from clvol.volumes.read import read_volume
-from clvol.volumes.repair import sanitized
+from clvol.volumes.repair import sanitized, warn_of
 
 if TYPE_CHECKING:
     import os
@@ -27,7 +27,8 @@ def load_volume(
     Parameters
     ----------
     path : .vdb, .nvdb, .vol, .npy, .npz or what else `clvol.volumes.read_volume` reads.
-    grid : which of the file's grids or arrays; default "density" of sparse files, else the only one.
+    grid : which of the file's grids or arrays; default "density" of sparse files, or the
+        only one.
     level_set : "fog" makes a fog volume of a level set (OpenVDB's sdfToFogVolume).
     sanitize : NaN and slightly negative samples, down to a tenth of the greatest, become 0; a warning counts
         them.
@@ -49,4 +50,8 @@ def load_volume(
     read = read_volume(path, grid)
     if level_set is not None:
         read = fog_of(read)
-    return sanitized(read)[0] if sanitize else read
+    if not sanitize:
+        return read
+    mended, repairs = sanitized(read)
+    warn_of(read, repairs)
+    return mended

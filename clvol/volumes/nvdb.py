@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from clvol.volumes.files import MAX_BYTES, place
-from clvol.volumes.grid_info import GridInfo, entries_named, listed_names
+from clvol.volumes.grid_info import GridInfo, chosen, listed_names, missing
 from clvol.volumes.nvdb_bytes import CODEC_NAMES
 from clvol.volumes.nvdb_header import NanoEntry, NanoGrid, read_entries, read_grid
 from clvol.volumes.nvdb_layout import READABLE
@@ -67,14 +67,15 @@ def _refusal(grid: NanoGrid) -> str:
 
 
 def read_nvdb(
-    path: str | os.PathLike[str], grid: str | int = "density", *, max_bytes: int = MAX_BYTES
+    path: str | os.PathLike[str], grid: str | int | None = None, *, max_bytes: int = MAX_BYTES
 ) -> SparseGrid:
     """One grid of a NanoVDB file.
 
     Parameters
     ----------
     path : a .nvdb file of version 32, of any codec; also bare grids without a file's header.
-    grid : its name, or its number in the file's order, from 0; names as `read_vdb` takes them.
+    grid : its name, or its number in the file's order, from 0; names as `read_vdb` takes them.  None is
+        "density", or the only grid of the file.
     max_bytes : what the returned arrays may take; a file that needs more is refused before they exist.
 
     Raises
@@ -87,11 +88,9 @@ def read_nvdb(
     """
     with open_vdb(path) as stream:
         entries = read_entries(stream)
-        found = (
-            entries_named(entries, grid, stream.where) if isinstance(grid, str) else entries[grid : grid + 1]
-        )
+        found = chosen(entries, grid, stream.where)
         if not found:
-            stream.fail(f"has no grid {grid!r}", listed_names(entries))
+            stream.fail(missing(grid), listed_names(entries))
         stream.where = place(str(path), found[0].name)
         data = found[0].bytes_of(stream)
         header = read_grid(data)

@@ -151,7 +151,8 @@ def _segment(stream: VdbStream, entries: list[NanoEntry]) -> int:
             stream.fail(f"a grid's name takes {name_bytes} bytes")
         found.append((_text(stream.take(name_bytes)), size, packed))
     at = stream.pos
-    for name, size, packed in found:
+    for name, size, counted in found:
+        packed = _with_its_size(stream, at, counted, codec)
         if packed > stream.end - at:
             stream.fail(f"grid {name!r} says that it takes {packed} bytes, {stream.end - at} are left")
         if size > MOST_RATIO * packed or (codec == NONE and size != packed):
@@ -159,6 +160,14 @@ def _segment(stream: VdbStream, entries: list[NanoEntry]) -> int:
         entries.append(NanoEntry(name, _alike(entries, name), codec, at, packed, size))
         at += packed
     return int(at)
+
+
+def _with_its_size(stream: VdbStream, at: int, packed: int, codec: int) -> int:
+    """Bytes of a grid in the file: Warp counts its one chunk without the 64 bits before it, its size."""
+    if codec == NONE or packed + 8 > stream.end - at:
+        return packed
+    stream.seek(at)
+    return packed + 8 if stream.unpack("<Q")[0] == packed else packed
 
 
 def _text(raw: bytes) -> str:

@@ -37,9 +37,8 @@ def list_sparse(path: str | os.PathLike[str]) -> list[GridInfo]:
 
 
 def read_sparse(path: str | os.PathLike[str], grid: str | int | None = None) -> SparseGrid:
-    """One grid of a .vdb or .nvdb file, by name (default "density") or number, as their readers do."""
-    name = "density" if grid is None else grid
-    return read_nvdb(path, name) if _is_nanovdb(path) else read_vdb(path, name)
+    """One grid of a .vdb or .nvdb file, by name or number, as their readers do."""
+    return read_nvdb(path, grid) if _is_nanovdb(path) else read_vdb(path, grid)
 
 
 def _vol(path: str | os.PathLike[str], grid: str | None) -> Grid:
@@ -97,8 +96,9 @@ def read_volume(path: str | os.PathLike[str], grid: str | None = None) -> Grid:
     path : .vdb, .nvdb, .vol, .npy, .npz; with the extra `science` .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd,
         .dcm, .tif, .h5, .nc, .zarr, .vti, and a folder of DICOM slices.  "scan.h5:/density" names an array
         inside.
-    grid : the grid of a .vdb or .nvdb (default "density"), the array of a .npz, .h5, .zarr or .vti (default
-        the only one), the series of a DICOM folder; or of an array of more axes "[3]", its part.
+    grid : the grid of a .vdb or .nvdb (default "density", or the only one), the array of a .npz, .h5, .zarr
+        or .vti (default the only one), the series of a DICOM folder; or of an array of more axes "[3]", its
+        part.
 
     Raises VolumeError as the reader of the format does, and for other suffixes; OptionError where the package
     that reads the format is missing.

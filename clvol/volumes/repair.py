@@ -30,7 +30,7 @@ class Repairs:
 
 
 def sanitized(grid: Grid, signed: bool = False) -> tuple[Grid, Repairs]:
-    """The grid with NaN and slightly negative samples as 0, and how many they were; a warning counts them.
+    """The grid with NaN and slightly negative samples as 0, and how many they were.
 
     Slightly negative is what resampling and compression leave: down to -SLIGHT times the greatest sample.
     Anything else stays, for the checks to refuse: infinity, and what is more negative.
@@ -55,5 +55,10 @@ def sanitized(grid: Grid, signed: bool = False) -> tuple[Grid, Repairs]:
         slab[np.isnan(slab) | ((slab < 0) & (slab >= lowest))] = 0
     if isinstance(mended, DenseGrid):
         mended.values.flags.writeable = False
-    log.warning("%s: %s samples are taken as 0", place(grid.source, grid.name), counted)
     return mended, counted
+
+
+def warn_of(grid: Grid, repairs: Repairs) -> None:
+    """Say in the log how many samples of a grid are taken as 0, if any are."""
+    if repairs:
+        log.warning("%s: %s samples are taken as 0", place(grid.source, grid.name), repairs)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from clvol.errors import VolumeError
 from clvol.volumes.files import MAX_BYTES, place
-from clvol.volumes.grid_info import GridInfo, entries_named, listed_names
+from clvol.volumes.grid_info import GridInfo, chosen, listed_names, missing
 from clvol.volumes.vdb_header import (
     COMPRESSION_NAMES,
     Descriptor,
@@ -82,7 +82,7 @@ def _refusal(value_type: str) -> str:
 
 
 def read_vdb(
-    path: str | os.PathLike[str], grid: str | int = "density", *, max_bytes: int = MAX_BYTES
+    path: str | os.PathLike[str], grid: str | int | None = None, *, max_bytes: int = MAX_BYTES
 ) -> SparseGrid:
     """One grid of an OpenVDB file.
 
@@ -91,6 +91,7 @@ def read_vdb(
     path : a .vdb file, versions 222–224 (225 with a warning).
     grid : its name, or its number in the file's order, from 0.  Grids of the same name are told apart as
         OpenVDB does, "density[0]", "density[1]", …; the plain name is the first of them, with a warning.
+        None is "density", or the only grid of the file.
     max_bytes : what the returned arrays may take; a file that needs more is refused before they exist.
 
     Raises
@@ -119,13 +120,13 @@ def read_vdb(
     return tree.grid(index_to_world, kind, descriptor.name, str(path))
 
 
-def find_grid(stream: VdbStream, grid: str | int) -> tuple[Descriptor, Descriptor]:
+def find_grid(stream: VdbStream, grid: str | int | None) -> tuple[Descriptor, Descriptor]:
     """The directory's entries of the grid, and of the grid whose tree it uses (itself or its parent).
 
     `grid` : its name or number; of several grids with one name, that name is the first, with a warning.
     """
     entries, damage = _directory(stream)
-    found = _named(stream, entries, grid) if isinstance(grid, str) else entries[grid : grid + 1]
+    found = _found(stream, entries, "density" if damage and grid is None else grid)
     if found:
         parent = found[0].parent
         for entry in found if not parent else entries:
@@ -135,7 +136,7 @@ def find_grid(stream: VdbStream, grid: str | int) -> tuple[Descriptor, Descripto
         raise damage
     if found:
         stream.fail(f"grid {found[0].name!r} shares the tree of {parent!r}, which the file lacks")
-    stream.fail(f"has no grid {grid!r}", listed_names(entries))
+    stream.fail(missing(grid), listed_names(entries))
 
 
 def _directory(stream: VdbStream) -> tuple[list[Descriptor], VolumeError | None]:
@@ -150,10 +151,10 @@ def _directory(stream: VdbStream) -> tuple[list[Descriptor], VolumeError | None]
     return entries, None
 
 
-def _named(stream: VdbStream, entries: list[Descriptor], name: str) -> list[Descriptor]:
-    """Those entries that a name means; one may also be named as the file does, with 0x1e."""
-    unique = [entry for entry in entries if entry.unique_name == name != entry.plain_name]
-    return unique or entries_named(entries, name, stream.where)
+def _found(stream: VdbStream, entries: list[Descriptor], grid: str | int | None) -> list[Descriptor]:
+    """Those entries that a name or number means; one may also be named as the file does, with 0x1e."""
+    unique = [entry for entry in entries if entry.unique_name == grid != entry.plain_name]
+    return unique or chosen(entries, grid, stream.where)
 
 
 def _value_type(stream: VdbStream, descriptor: Descriptor) -> ValueType:

@@ -49,9 +49,18 @@ def version_number(major: int, minor: int, patch: int) -> int:
 
 
 def write_nvdb(
-    path, grids: Sequence[GridSpec], kinds="Float", codec=NONE, version=(32, 4, 2), magic=b"NanoVDB0"
+    path,
+    grids: Sequence[GridSpec],
+    kinds="Float",
+    codec=NONE,
+    version=(32, 4, 2),
+    magic=b"NanoVDB0",
+    uncounted=0,
 ) -> bytes:
-    """Write a segment with the grids; `kinds` is a type, or one for each.  Returns the file's bytes."""
+    """Write a segment with the grids; `kinds` is a type, or one for each.  Returns the file's bytes.
+
+    uncounted : bytes of each grid that its size in the file leaves out.
+    """
     kinds = [kinds] * len(grids) if isinstance(kinds, str) else kinds
     number = version_number(*version)
     out = bytearray(struct.pack("<8sIHH", magic, number, len(grids), codec))
@@ -60,7 +69,9 @@ def write_nvdb(
         raw = grid_bytes(spec, kind, number, magic)
         blobs.append(packed(raw, codec))
         name = spec.name.encode() + b"\0"
-        out += struct.pack("<4Q", len(raw), len(blobs[-1]), 0, 0) + struct.pack("<2I", NAMES.index(kind), 0)
+        out += struct.pack("<4Q", len(raw), len(blobs[-1]) - uncounted, 0, 0) + struct.pack(
+            "<2I", NAMES.index(kind), 0
+        )
         out += struct.pack("<6d6i3dI4I3I2HI", *[0] * 15, len(name), *[0] * 7, codec, 0, number) + name
     path.write_bytes(out + b"".join(blobs))
     return path.read_bytes()

@@ -115,6 +115,14 @@ def test_versions_in_the_field(tmp_path, version, magic):
     assert_holds(read_nvdb(tmp_path / "a.nvdb"), spec, "Float")
 
 
+@pytest.mark.parametrize("codec", [ZIP, BLOSC])
+def test_grids_whose_size_leaves_out_that_of_the_chunk_as_warp_writes_them(tmp_path, codec):
+    specs = [GridSpec(name, tiles=[((0, 0, 0), 8, value, True)]) for name, value in (("a", 1), ("b", 2))]
+    write_nvdb(tmp_path / "a.nvdb", specs, codec=codec, uncounted=8)
+    for name, value in (("a", 1), ("b", 2)):
+        assert read_nvdb(tmp_path / "a.nvdb", name).tile_values.tolist() == [[value]]
+
+
 @pytest.mark.parametrize("magic", [b"NanoVDB0", b"NanoVDB1"])
 def test_bare_grids_one_after_the_other(tmp_path, magic):
     specs = [replace(rich("Float"), name="density"), replace(rich("Float"), name="heat", background=3)]

@@ -138,3 +138,12 @@ def test_media_that_share_a_volume_still_do():
     }
     medium = clvol.load_dict(scene).shapes[0].interior
     assert medium.sigma_t is medium.emission
+
+
+def test_a_volume_alone_can_be_sanitized(tmp_path, caplog):
+    np.save(tmp_path / "a.npy", faulty())
+    with pytest.raises(VolumeError, match="sanitize=True"):
+        clvol.volume_scene(tmp_path / "a.npy")
+    medium = clvol.volume_scene(tmp_path / "a.npy", sanitize=True).shapes[0].interior
+    assert medium.sigma_t.repairs == "2 NaN and 2 slightly negative"
+    assert caplog.text.count("are taken as 0") == 1

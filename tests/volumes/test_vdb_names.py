@@ -10,6 +10,7 @@ import re
 
 import numpy as np
 import pytest
+from nvdb_writer import write_nvdb
 from places import CASES
 from vdb_writer import GridSpec, write_vdb
 
@@ -134,3 +135,25 @@ def test_a_grid_with_a_tree_of_its_own_needs_a_sound_offset_of_it(tmp_path):
     path.write_bytes(data)
     with pytest.raises(VolumeError, match=re.escape("grid 'density' has offsets")):
         read_vdb(path)
+
+
+@pytest.mark.parametrize("write", [write_vdb, write_nvdb])
+def test_without_a_name_the_only_grid_is_meant_whatever_it_is_called(tmp_path, write):
+    grids = [GridSpec(name, tiles=[((0, 0, 0), 8, 2, True)]) for name in ("smoke", "heat")]
+    write(tmp_path / "a.vdb", grids[:1])
+    write(tmp_path / "b.vdb", grids)
+    assert read_volume(tmp_path / "a.vdb").name == "smoke"
+    with pytest.raises(VolumeError, match="has no grid 'density'; its grids are 'smoke', 'heat'"):
+        read_volume(tmp_path / "b.vdb")
+
+
+def test_a_grid_that_is_named_here_and_not_there_is_read_once(tmp_path):
+    write_vdb(tmp_path / "a.vdb", [GridSpec(tiles=[((0, 0, 0), 8, 0.5, True)])])
+    plain = {"type": "vdbvolume", "filename": str(tmp_path / "a.vdb")}
+    for first, second in ((plain, plain | {"grid": "density"}), (plain | {"grid": "density"}, plain)):
+        medium = {"type": "heterogeneous", "sigma_t": first, "albedo": second}
+        box = {"type": "cube", "bsdf": {"type": "null"}, "interior": medium}
+        interior = (
+            clvol.load_dict({"type": "scene", "s": {"type": "perspective"}, "b": box}).shapes[0].interior
+        )
+        assert interior.sigma_t.grid is interior.albedo.grid
