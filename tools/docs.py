@@ -14,6 +14,7 @@ import sys
 import tempfile
 import textwrap
 import time
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,6 +26,7 @@ from benchmarks.tables import judge
 from docs_tables import ROOT, performance_part, pilot_page, techniques_page, transitions_part
 from documents import between, writable, write
 from pilot import SCENES, pilot_options, tested
+from recipes import RECIPES
 
 from clvol.cli.messages import OneLineErrors
 
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
 
 DOCS = ROOT / "docs"
 PERFORMANCE, ARCHITECTURE = DOCS / "performance.md", DOCS / "architecture.md"
+RECIPES_PAGE = DOCS / "recipes.md"
 COMMAND_LINE, README = DOCS / "command-line.md", ROOT / "README.md"
 PICTURED = ("gallery.md", "ray.md")
 """Pages whose commands make their pictures."""
@@ -208,11 +211,22 @@ def transitions(output: Path) -> None:
     write(output, f"{before}\n{transitions_part()}\n{after}")
 
 
+@main.command()
+@click.argument("names", nargs=-1, type=click.Choice(list(RECIPES)))
+def recipes(names: tuple[str, ...]) -> None:
+    """The plots and tables of recipes.md, or only those NAMES, by tools/recipe.py."""
+    for name in names or RECIPES:
+        markers = f"<!-- {name}: written by tools/docs.py -->", f"<!-- end of {name} -->"
+        before, after = between(RECIPES_PAGE.read_text(encoding="utf-8"), *markers, RECIPES_PAGE.name)
+        found = import_module(f"recipes.{name}").run(DOCS / "pictures" / f"recipe-{name}.png", quick=False)
+        write(RECIPES_PAGE, f"{before}\n{found}\n{after}")
+
+
 @main.command("all")
 @mitsuba_option
 @click.pass_context
 def everything(context: click.Context, mitsuba: str | None) -> int:
-    """Everything: pictures, profile, techniques, pilot, performance, in about an hour on two cores.
+    """Everything: pictures, profile, techniques, pilot, recipes, performance, in about an hour on two cores.
 
     Figures are of a machine that does nothing else meanwhile. The exit status is 1 where one of the parts
     says so.
@@ -224,6 +238,7 @@ def everything(context: click.Context, mitsuba: str | None) -> int:
         (profile, {}),
         (techniques, {}),
         (pilot, {}),
+        (recipes, {}),
         (performance, {"mitsuba": mitsuba}),
     )
     for part, options in parts:

@@ -102,8 +102,8 @@ def _errors(findings: Findings, curves: list[_Drawn], unit: str) -> bytes:
     axes.set(xscale="log", yscale="log", xlabel=unit, ylabel="relative MSE")
     if starts:
         _guide(axes, starts)
-    _plain_ticks(axes.xaxis)
-    _plain_ticks(axes.yaxis)
+    plain_ticks(axes.xaxis)
+    plain_ticks(axes.yaxis)
     axes.grid(True, which="minor", color="#f2f2f2", linewidth=0.5)
     figure.legend(fontsize=8, loc="outside lower center", ncols=3)
     return _png(figure)
@@ -143,13 +143,13 @@ def _efficiencies(figure: Figure, findings: Findings) -> None:
         axes.set(xscale="log", xlabel=f"efficiency by {word}, relative to {findings.baseline}")
         finite = [end for end in ends if 0 < end < math.inf]
         axes.set_xlim(min(finite) / 1.3, max(finite) * 1.3)
-        _plain_ticks(axes.xaxis)
+        plain_ticks(axes.xaxis)
         axes.grid(False, axis="y")
     panels[0].set_yticks(places, [f.label for f in findings.figures])
     panels[0].set_ylim(-0.6, len(places) - 0.4)
 
 
-def _plain_ticks(axis: Axis) -> None:
+def plain_ticks(axis: Axis) -> None:
     """Plain numbers on a logarithmic axis whose range is set: at least two, and not too many."""
     from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
