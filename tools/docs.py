@@ -219,7 +219,7 @@ def recipes(names: tuple[str, ...]) -> None:
         markers = f"<!-- {name}: written by tools/docs.py -->", f"<!-- end of {name} -->"
         before, after = between(RECIPES_PAGE.read_text(encoding="utf-8"), *markers, RECIPES_PAGE.name)
         found = import_module(f"recipes.{name}").run(DOCS / "pictures" / f"recipe-{name}.png", quick=False)
-        write(RECIPES_PAGE, f"{before}\n{found}\n{after}")
+        write(RECIPES_PAGE, f"{before}\n\n{found}\n\n{after}")
 
 
 @main.command("all")

@@ -19,7 +19,7 @@ from pilot import HEADER, HOPELESS, Tested
 import clvol
 from clvol.device.device import open_device
 from clvol.layout.stages import IDLE, QUEUES, STAGES
-from clvol.planning.registry import TECHNIQUES, TRANSMITTANCES
+from clvol.planning.registry import SAMPLERS, TECHNIQUES, TRANSMITTANCES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -52,7 +52,8 @@ Made by `python tools/docs.py techniques --seconds {seconds:g} --rounds {rounds}
 each in {rounds} rounds, with independent samples; errors are those against a reference of
 independent seeds, whose own variance is subtracted. Efficiency is 1 / (MSE × seconds),
 precomputation counted and kernel builds not, and 1 / (MSE × look-ups), as multiples of the first
-row's, with 95 % intervals; **bold** where the difference is significant (Holm). The slope is that
+row's, with 95 % intervals; they hold for renders of as many samples a pixel as stand beside them.
+**Bold** where the difference is significant (Holm). The slope is that
 of a render's MSE over its samples: -1 for independent samples without bias (no slope where renders
 are too short to be cut). "Bias seen" is the
 smallest relative bias of the image mean that the test against the reference would have noticed; its
@@ -61,7 +62,7 @@ verdict has a false alarm once in 10,000.
 SAMPLERS = """\
 ## Samplers
 
-At 64 samples a pixel, beside `delta` with sampler `independent`; {rounds} renders of each by turns.
+At 64 samples a pixel, beside `delta` with sampler `independent`; {rounds} renders of each by turns. `joint` is the default.
 
 | scene, technique, sampler | MSE, times less | efficiency by time | largest pixel error, times less |
 |---|---|---|---|
@@ -117,8 +118,8 @@ def compared(scene: str, sizes: dict[str, int], **options: object) -> Comparison
 def table(comparison: Comparison) -> list[str]:
     """Rows of a comparison as Markdown."""
     lines = [
-        "| | efficiency by time | by look-ups | look-ups a sample | slope | bias seen | agrees |",
-        "|---|---|---|---|---|---|---|",
+        "| | spp a render | efficiency by time | by look-ups | look-ups a sample | slope | bias seen | agrees |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     return lines + [row(figures) for figures in comparison.figures]
 
@@ -132,7 +133,7 @@ def row(figures: Figures) -> str:
     efficiency = [shown(figures, cost) for cost in ("seconds", "lookups")]
     name = f"`{figures.label}`" + (" *biased*" if figures.biased else "")
     return (
-        f"| {name} | {efficiency[0]} | {efficiency[1]} | {lookups:.3g} "
+        f"| {name} | {measured.spp} | {efficiency[0]} | {efficiency[1]} | {lookups:.3g} "
         f"| {'–' if math.isnan(slope.value) else f'{slope.value:.2f} ({slope.low:.2f} to {slope.high:.2f})'} "
         f"| {100 * verdict.smallest_bias:.2g} % | {'yes' if verdict.agrees else 'NO'} |"
     )
@@ -156,7 +157,7 @@ def sampler_rows(name: str, rounds: int) -> list[str]:
         f"scenes/{name}.xml",
         SAMPLED[name],
         techniques=["delta", "regular"],
-        samplers=["independent", "sobol"],
+        samplers=list(SAMPLERS),
         spp=64,
         rounds=rounds,
     )

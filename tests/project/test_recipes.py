@@ -14,8 +14,8 @@ def test_every_recipe_is_on_the_page_with_its_command_plot_and_table(tool) -> No
     for name in NAMES:
         assert f"\npython tools/recipe.py {name} -o {name}.png\n" in page
         assert (tool("folders").ROOT / "docs" / "pictures" / f"recipe-{name}.png").is_file()
-        _, _, rest = page.partition(f"<!-- {name}: written by tools/docs.py -->\n")
-        table, ended, _ = rest.partition(f"\n<!-- end of {name} -->")
+        _, _, rest = page.partition(f"<!-- {name}: written by tools/docs.py -->\n\n")
+        table, ended, _ = rest.partition(f"\n\n<!-- end of {name} -->")
         assert ended and table.startswith("| ") and len(table.splitlines()) > 5
 
 
