@@ -52,17 +52,18 @@ Made by `python tools/docs.py techniques --seconds {seconds:g} --rounds {rounds}
 each in {rounds} rounds, with independent samples; errors are those against a reference of
 independent seeds, whose own variance is subtracted. Efficiency is 1 / (MSE × seconds),
 precomputation counted and kernel builds not, and 1 / (MSE × look-ups), as multiples of the first
-row's, with 95 % intervals; they hold for renders of as many samples a pixel as stand beside them.
+row's, with 95 % intervals; they hold for renders of as many samples a pixel (spp) as stand beside them.
 **Bold** where the difference is significant (Holm). The slope is that
 of a render's MSE over its samples: -1 for independent samples without bias (no slope where renders
 are too short to be cut). "Bias seen" is the
 smallest relative bias of the image mean that the test against the reference would have noticed; its
 verdict has a false alarm once in 10,000.
 """
-SAMPLERS = """\
+SAMPLERS_PART = """\
 ## Samplers
 
-At 64 samples a pixel, beside `delta` with sampler `independent`; {rounds} renders of each by turns. `joint` is the default.
+At 64 samples a pixel, beside `delta` with sampler `independent`; {rounds} renders of each by turns.
+`joint` is the default.
 
 | scene, technique, sampler | MSE, times less | efficiency by time | largest pixel error, times less |
 |---|---|---|---|
@@ -118,7 +119,7 @@ def compared(scene: str, sizes: dict[str, int], **options: object) -> Comparison
 def table(comparison: Comparison) -> list[str]:
     """Rows of a comparison as Markdown."""
     lines = [
-        "| | spp a render | efficiency by time | by look-ups | look-ups a sample | slope | bias seen | agrees |",
+        "| | spp | efficiency by time | by look-ups | look-ups a sample | slope | bias seen | agrees |",
         "|---|---|---|---|---|---|---|---|",
     ]
     return lines + [row(figures) for figures in comparison.figures]
@@ -178,7 +179,7 @@ def techniques_page(seconds: float, rounds: int) -> str:
         parts += [f"## {title}", "", f"`{scene}`: {what}.", ""]
         parts += [*table(compared(scene, sizes, techniques=list(TECHNIQUES), **options)), ""]
         parts += [*table(compared(scene, sizes, transmittances=list(TRANSMITTANCES), **options)), ""]
-    parts += [SAMPLERS.format(rounds=rounds).rstrip()]
+    parts += [SAMPLERS_PART.format(rounds=rounds).rstrip()]
     for name in SAMPLED:
         parts += sampler_rows(name, rounds)
     return "\n".join(parts) + "\n"

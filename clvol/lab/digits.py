@@ -12,6 +12,8 @@ MOST_DIGITS = 7
 """Significant digits of float32, which nothing here has more of."""
 _SMALL, _LARGE = 1e-3, 1e6
 """Beyond, a power of ten spares counting noughts."""
+_FAR = 10.0
+"""An end that is more than so many times as large as the value is told to a twentieth of itself."""
 _NOTHING = 1e-290
 """Anything smaller is shown as 0."""
 
@@ -43,7 +45,10 @@ def with_ends(interval: Interval) -> str:
     scale, power = _scale(abs(interval.value))
     ends = interval.value, interval.low, interval.high
     error = min(interval.value - interval.low, interval.high - interval.value) / 2
-    value, low, high = (f"{_cut(number * scale, error * scale)}{power}" for number in ends)
+    errors = [max(error, abs(end) / 20) if abs(end) > _FAR * abs(interval.value) else error for end in ends]
+    value, low, high = (
+        f"{_cut(end * scale, own * scale)}{power}" for end, own in zip(ends, errors, strict=True)
+    )
     return f"{value} ({low} to {high})"
 
 

@@ -105,7 +105,8 @@ def _errors(findings: Findings, curves: list[_Drawn], unit: str) -> bytes:
     plain_ticks(axes.xaxis)
     plain_ticks(axes.yaxis)
     axes.grid(True, which="minor", color="#f2f2f2", linewidth=0.5)
-    figure.legend(fontsize=8, loc="outside lower center", ncols=3)
+    if starts:  # an error to show, and so an entry
+        figure.legend(fontsize=8, loc="outside lower center", ncols=3)
     return _png(figure)
 
 
