@@ -110,6 +110,8 @@ def _grid(reader: Reader) -> Grid:
             hint=" and ".join(sources),
         )
     if sources != ["filename"]:
+        if reader.has("level_set"):
+            reader.fail("an array is no level set of a .vdb or .nvdb file", "level_set", "leave it out")
         if name is not None:
             reader.fail(f"an array has no grid named '{name}'", "grid", "the name goes with a filename")
         if isinstance(reader.node[sources[0]], DenseGrid | SparseGrid):

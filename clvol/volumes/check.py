@@ -78,7 +78,7 @@ def _check(grid: Grid, what: str, signed: bool) -> None:
 
 def _what_sanitize_leaves(grid: Grid, lowest: float, signed: bool) -> str:
     """What of a grid's faults `clvol.volumes.repair.sanitized` does not take as 0, for a hint."""
-    least = -SLIGHT * greatest(grid)
+    least = 0.0 - SLIGHT * greatest(grid)
     left = ["infinite samples"] if any(np.isinf(slab).any() for slab in slabs(grid)) else []
     left += [f"those below {least:.6g}"] if lowest < least and not signed else []
     return f", which leaves {' and '.join(left)}" if left else ""

@@ -36,12 +36,13 @@ def fog_of(grid: Grid) -> SparseGrid:
         least = np.fmin.reduce(grid.leaf_values, axis=None, initial=np.float32(0))
     values = np.minimum(grid.leaf_values, 0)
     if least:
-        values *= np.float32(1) / least
+        with np.errstate(over="ignore", invalid="ignore"):  # the checks count what is not finite
+            values *= np.float32(1) / least
         values += np.float32(0)  # no -0
+    # what is not finite is active, for the checks to count
     active = np.packbits(
-        (values[..., 0] > 0).transpose(0, 3, 2, 1).reshape(-1, 512), axis=1, bitorder="little"
+        (values[..., 0] != 0).transpose(0, 3, 2, 1).reshape(-1, 512), axis=1, bitorder="little"
     )
-    # what is not finite stays for the checks to count
     kept = (values != 0).any(axis=(1, 2, 3, 4))
     values, active, origins = values[kept], active[kept], grid.leaf_origins[kept]
     tiles, edges = grid.tile_origins[inside], grid.tile_sizes[inside]

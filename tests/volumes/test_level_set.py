@@ -107,6 +107,19 @@ def test_a_file_may_not_say_that_it_is_a_level_set(tmp_path):
     assert clvol.load_volume(tmp_path / "a.vdb", level_set="fog").leaf_values.max() == 1
 
 
+def test_distances_that_are_not_finite_are_counted(tmp_path):
+    spec = band()
+    spec.leaves[0, 0, 0][0][0, 0, :2] = np.nan, -np.inf
+    write_vdb(tmp_path / "a.vdb", [spec])
+    with pytest.raises(VolumeError, match="2 NaN or infinite of"):
+        medium(filename=str(tmp_path / "a.vdb"), level_set="fog")
+    spec.leaves = {(0, 0, 0): (np.full((8, 8, 8), np.nan), np.ones((8, 8, 8), bool))}
+    spec.tiles = []
+    write_vdb(tmp_path / "a.vdb", [spec])
+    with pytest.raises(VolumeError, match="512 NaN or infinite of"):
+        medium(filename=str(tmp_path / "a.vdb"), level_set="fog")
+
+
 def test_what_is_no_level_set_is_refused(tmp_path):
     spec = band()
     spec.metadata = [("class", "string", b"fog volume")]
@@ -115,6 +128,8 @@ def test_what_is_no_level_set_is_refused(tmp_path):
         clvol.load_volume(tmp_path / "a.vdb", level_set="fog")
     with pytest.raises(VolumeError, match="is no level set"):
         fog_of(dense_from_array(np.zeros((2, 2, 2))))
+    with pytest.raises(SceneError, match="an array is no level set"):
+        clvol.load_dict({"type": "scene", "m": {"type": "gridvolume", "data": 1, "level_set": "fog"}})
     with pytest.raises(OptionError, match="level_set cannot be 'smoke'"):
         clvol.load_volume(tmp_path / "a.vdb", level_set="smoke")
     with pytest.raises(SceneError, match=r"level_set.* cannot be 'smoke'"):
