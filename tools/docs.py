@@ -37,7 +37,7 @@ DOCS = ROOT / "docs"
 PERFORMANCE, ARCHITECTURE = DOCS / "performance.md", DOCS / "architecture.md"
 RECIPES_PAGE = DOCS / "recipes.md"
 COMMAND_LINE, README = DOCS / "command-line.md", ROOT / "README.md"
-PICTURED = ("gallery.md", "ray.md")
+PICTURED = ("getting-started.md", "gallery.md", "ray.md")
 """Pages whose commands make their pictures."""
 FIRST, LAST = "<!-- performance: written by tools/docs.py -->", "<!-- end of performance -->"
 IN_README = "<!-- speed: written by tools/docs.py -->", "<!-- end of speed -->"

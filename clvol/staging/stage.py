@@ -37,7 +37,7 @@ SPP = 256
 MAX_DEPTH, RR_DEPTH = 128, 16
 DIMMED = 0.4
 """What all light is multiplied by where the volume glows by itself."""
-FLOOR, FLOOR_SIZE = 0.3, 40.0
+FLOOR, FLOOR_SIZE = 0.12, 40.0
 """Reflectance of the floor, and its radius in diagonals of the box."""
 
 

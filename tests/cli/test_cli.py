@@ -263,6 +263,7 @@ def test_options_reach_render_unchanged(scene: str, tmp_path: Path, monkeypatch:
     del seen["progress"]
     assert seen == {
         "profile": False,
+        "denoise": False,
         "sensor": 0,
         "size": (64, 48),
         "spp": None,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import logging
 import re
+import shlex
 import shutil
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ import numpy as np
 import OpenImageIO as oiio  # noqa: N813
 import pytest
 from click.testing import CliRunner, Result
-from places import CASES, SCENES
+from places import CASES, ROOT, SCENES
 
 import clvol
 from clvol.cli.main import main
@@ -303,3 +304,21 @@ def test_background_is_still_a_choice_of_the_renderer(npz: Path, tmp_path: Path)
     spec = oiio.ImageBuf(str(tmp_path / "a.exr")).spec()
     assert spec.get_string_attribute("background") == "sampled"
     assert isinstance(clvol.volume_scene(npz).shapes[0].interior.albedo, ConstVolume)
+
+
+@pytest.mark.contract
+def test_the_commands_that_begin_the_documentation_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = (ROOT / "docs" / "getting-started.md").read_text(encoding="utf-8")
+    commands = re.findall(r"^clvol ((?:render|scene) scenes/fire.vdb .*)$", text, re.MULTILINE)
+    assert len(commands) >= 3
+    (tmp_path / "scenes").symlink_to(SCENES, target_is_directory=True)
+    monkeypatch.chdir(tmp_path)
+    for command in commands:
+        words = shlex.split(command)
+        if "--denoise" in words:
+            pytest.importorskip("pyoidn", reason="the extra 'denoise' is not installed")
+        outcome = run(*words, "--size", "16x16", *([] if "--quality" in words else ["--spp", "1"]))
+        assert outcome.exit_code == 0, outcome.output
+        assert (tmp_path / words[words.index("-o") + 1]).is_file()
