@@ -25,7 +25,7 @@ from clvol.rendering.outcome import make_result
 from clvol.rendering.profiler import timed
 from clvol.rendering.session import MAX_SAMPLES, Session
 from clvol.scene.records import Scene
-from clvol.scene.views import viewed
+from clvol.scene.views import View, viewed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -62,7 +62,7 @@ class Order:
     spp: int | None
     seed: int
     time_limit: float | None
-    sensor: int | None
+    sensor: View | None
     size: tuple[int, int] | None
     transparent: bool
     denoise: bool
@@ -220,7 +220,8 @@ class Opened:
         if order.transparent:
             given["background"] = registry.TRANSPARENT
         size = None if order.size is None else "x".join(map(str, order.size))
-        return given | {"sensor": order.sensor, "size": size, "seed": order.seed, "device": order.device}
+        sensor = order.sensor if isinstance(order.sensor, int) else None
+        return given | {"sensor": sensor, "size": size, "seed": order.seed, "device": order.device}
 
 
 def _denoises(asked: bool) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 from clvol.api.order import Order, check_scene
 from clvol.base.interrupts import interruptible
@@ -14,6 +14,8 @@ from clvol.planning import registry
 from clvol.planning.choices import NUMBERS, Choices
 from clvol.planning.plan import Plan
 from clvol.rendering.profiler import Profiler, timed
+from clvol.rendering.residence import staying
+from clvol.scene.views import viewed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,14 +24,20 @@ if TYPE_CHECKING:
     from clvol.base.progress import ProgressCallback
     from clvol.picture.result import Result
     from clvol.scene.records import Scene
+    from clvol.scene.views import View
 
 
+@overload
+def render(scene: Scene, *, sensor: list[View] | tuple[View, ...], **options: Any) -> list[Result]: ...
+
+
+@overload
 def render(
     scene: Scene,
     *,
     spp: int | None = None,
     seed: int | None = None,
-    sensor: int | None = None,
+    sensor: View | None = None,
     size: tuple[int, int] | None = None,
     technique: str = "auto",
     transmittance: str = "auto",
@@ -58,7 +66,43 @@ def render(
     resume: Result | str | PathLike[str] | None = None,
     pool: int | None = None,
     profile: bool = False,
-) -> Result:
+) -> Result: ...
+
+
+def render(  # type: ignore[misc]  # the options of several views are those of one
+    scene: Scene,
+    *,
+    spp: int | None = None,
+    seed: int | None = None,
+    sensor: View | Sequence[View] | None = None,
+    size: tuple[int, int] | None = None,
+    technique: str = "auto",
+    transmittance: str = "auto",
+    majorant: str = "auto",
+    lookup: str = "auto",
+    absorption: str = "auto",
+    gathering: str = "auto",
+    roulette: str = "auto",
+    background: str = "auto",
+    probability: str = "auto",
+    control: str = "auto",
+    sampler: str = "auto",
+    shadow_cache: str = "auto",
+    light_choice: str = "auto",
+    next_event: str = "auto",
+    lanes: str = "auto",
+    majorant_scale: float = 1.0,
+    step: float | None = None,
+    aov: Sequence[str] = (),
+    time_limit: float | None = None,
+    target_error: float | None = None,
+    device: str | None = None,
+    progress: bool | ProgressCallback = False,
+    samples: tuple[int, int] | None = None,
+    resume: Result | str | PathLike[str] | None = None,
+    pool: int | None = None,
+    profile: bool = False,
+) -> Result | list[Result]:
     """Render a scene.
 
     Parameters
@@ -68,7 +112,9 @@ def render(
     spp, seed
         Samples per pixel and 64-bit seed. They default to the scene's.
     sensor
-        Which of the scene's sensors sees it, from 0. The default is the first.
+        Which of the scene's sensors sees it, from 0. The default is the first. Or a dict: a sensor as
+        `load_dict` takes it; or without a "type" what is other than in the scene's sensor, by the names of
+        `traverse`, as ``{"to_world": …}``. Or a list of these: the scene is built once for all views.
     size
         Pixels (width, height) instead of those of the scene's film. The field of view stays along the axis
         that it is given for.
@@ -114,7 +160,7 @@ def render(
 
     Returns
     -------
-    Result
+    Result, or a list of them where `sensor` is a list
         The picture and what is known of it. Ctrl-C finishes the paths in flight and returns the picture so
         far, with ``stats["interrupted"]`` set. A second Ctrl-C does not wait for them and keeps the samples
         that every pixel has. A third raises KeyboardInterrupt.
@@ -127,6 +173,8 @@ def render(
         The render was to end, and no pass of samples ever did.
     """
     given = dict(locals())
+    if isinstance(sensor, list | tuple):
+        return _views(**given)
     order = Order.of("render", scene, given)
     bar = progress_bar() if progress is True else nullcontext(progress or None)
     profiler = Profiler() if profile else None
@@ -147,6 +195,24 @@ def render(
             result.stats["interrupted"] = interrupt.asked()
     result.profile = profiler.profile(result) if profiler else None
     return result
+
+
+def _views(scene: Scene, sensor: Sequence[View], **options: Any) -> list[Result]:
+    """One view after the other, until one is ended early; all are looked at before the first is rendered."""
+    check_scene("render", scene)
+    if not sensor:
+        raise OptionError("there is no view to render: the list of sensors is empty")
+    if options["resume"] is not None:
+        raise OptionError("resume goes on from one picture", hint="render one view at a time")
+    for one in sensor:
+        viewed(scene, one, options["size"])
+    found: list[Result] = []
+    with interruptible(), staying(scene):
+        for one in sensor:
+            found.append(render(scene, sensor=one, **options))
+            if found[-1].stats["interrupted"]:
+                break
+    return found
 
 
 def plan(scene: Scene, **choices: Any) -> Plan:

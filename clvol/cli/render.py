@@ -212,7 +212,7 @@ class Painter:
 
             mention([announcement(scene, self.options)], err=True)
         with nullcontext(False) if self.quiet else RichProgress(self.console) as progress:
-            result = clvol.render(scene, progress=progress, **self.options)
+            result: Result = clvol.render(scene, progress=progress, **self.options)
         if piloted:
             from clvol.lab.repeat import with_definitions
 

@@ -6,12 +6,13 @@ is kept is never written to again: a render that goes on meanwhile keeps what it
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable
+    from collections.abc import Callable, Hashable, Iterator
 
     import pyopencl as cl
 
@@ -65,6 +66,18 @@ class Residence:
             self._made[name] = key, make()
         found: _Made = self._made[name][1]
         return found
+
+
+@contextmanager
+def staying(scene: Scene) -> Iterator[None]:
+    """What the scene takes on a device stays there between the renders in the block."""
+    before, scene.kept.on_device = scene.kept.on_device, True
+    try:
+        yield
+    finally:
+        scene.kept.on_device = before
+        if not before:
+            scene.kept.pop(__name__, None)
 
 
 def compiled(plan: Plan) -> Hashable:

@@ -180,6 +180,16 @@ def load_staged(scene: Mapping[str, object], source: str, grids: Grids) -> Scene
     return _build(from_dict(scene), source, grids)
 
 
+def load_sensor(given: Mapping[str, object]) -> tuple[Sensor, set[str]]:
+    """A sensor from a dict as `load_dict` takes it, and the kinds of plugins that it has inside."""
+    root = from_dict({"type": "scene", "sensor": given})
+    library, node = Library(root, PLUGINS), root["sensor"]
+    if (kind := library.kind_of(node)) != "sensor":
+        raise SceneError(f"'{node.type}' is a {kind}, not a sensor", node.where)
+    inside = (value for _, value in node.parameters() if isinstance(value, Node) and not value.is_value)
+    return build(node, library), {library.kind_of(library.resolve(value)) for value in inside}
+
+
 def _build(root: Node, source: str, grids: Grids | None = None) -> Scene:
     if root.type != "scene":
         raise SceneError(f"expected a scene, got a '{root.type}'", root.where)

@@ -61,6 +61,11 @@ def parameters_of(scene: records.Scene) -> dict[str, Parameter]:
     return found
 
 
+def sensor_parameters(sensor: records.Sensor) -> dict[str, Parameter]:
+    """The parameters of one sensor by name."""
+    return dict(_sensor(sensor, set()))
+
+
 def _field(owner: Any, name: str, check: Check, shown: Callable[[Any], Any] = lambda v: v) -> Parameter:
     """A field of a record that is a parameter as it stands."""
     return Parameter(owner, getattr(owner, name), check, lambda r, v: replace(r, **{name: v}), shown)

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from clvol.errors import OptionError, shown
-from clvol.scene.parameter_table import Parameter, parameters_of
+from clvol.scene.parameter_table import Parameter, parameters_of, sensor_parameters
 from clvol.scene.parameter_values import check_together
-from clvol.scene.records import Scene
+from clvol.scene.records import Scene, Sensor
 from clvol.scene.vocabulary import did_you_mean, join_hints, listed
 
 _ALIASES = {"interior": "interior_medium", "exterior": "exterior_medium", "phase": "phase_function"}
@@ -143,9 +143,7 @@ class SceneParameters(MutableMapping[str, Any]):
         changed = {n: v for n, v in self._set.items() if not _same(v, self._found[n].held)}
         made: dict[int, tuple[object, Any]] = {}
         for name, value in changed.items():
-            owner, put = self._found[name].owner, self._found[name].put
-            _, record = made.get(id(owner), (owner, owner))
-            made[id(owner)] = owner, put(record, value)
+            _put(made, self._found[name], value)
         for name in changed:
             check_together(made[id(self._found[name].owner)][1], name)
         done: dict[int, Any] = {}
@@ -165,6 +163,27 @@ class SceneParameters(MutableMapping[str, Any]):
                 parts["film"] = view.film
         for field, value in parts.items():
             object.__setattr__(self.scene, field, value)
+
+
+def sensor_with(sensor: Sensor, values: Mapping[str, Any]) -> Sensor:
+    """A sensor with other values, by the names of its parameters; errors as `SceneParameters.update` has."""
+    found = sensor_parameters(sensor)
+    made: dict[int, tuple[object, Any]] = {}
+    for name, value in values.items():
+        if name not in found:
+            hint = join_hints(did_you_mean(str(name), found), f"its parameters: {listed(found)}")
+            raise UnknownParameterError(f"a sensor has no parameter {shown(name)}", hint=hint)
+        _put(made, found[name], found[name].check(value, f"sensor.{name}"))
+    for name in values:
+        check_together(made[id(found[name].owner)][1], f"sensor.{name}")
+    changed: Sensor = _rebuilt(sensor, made, {})
+    return changed
+
+
+def _put(made: dict[int, tuple[object, Any]], parameter: Parameter, value: Any) -> None:
+    """Note the owner of a parameter, as it has been made so far, with a value that was checked."""
+    _, record = made.get(id(parameter.owner), (None, parameter.owner))
+    made[id(parameter.owner)] = parameter.owner, parameter.put(record, value)
 
 
 def _rebuilt(value: Any, made: Mapping[int, tuple[object, Any]], done: dict[int, Any]) -> Any:

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import operator
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from clvol.errors import OptionError, shown
+from clvol.scene.loader import load_sensor
+from clvol.scene.parameters import sensor_with
+from clvol.scene.records import Sampler, Sensor
 from clvol.scene.sensor import film_fault
+
+View = int | Mapping[str, Any]
+"""A sensor: the number of one that the scene has, or a dict."""
 
 TRANSPARENT = "transparent"
 """The background of a picture with alpha."""
@@ -18,7 +25,7 @@ if TYPE_CHECKING:
 
 def viewed(
     scene: Scene,
-    sensor: int | None = None,
+    sensor: View | None = None,
     size: tuple[int, int] | None = None,
     background: str = "auto",
 ) -> Scene:
@@ -28,21 +35,43 @@ def viewed(
     return before(scene, background) if background == TRANSPARENT else scene
 
 
-def seen_by(scene: Scene, sensor: int) -> Scene:
-    """The scene as its sensor of that number sees it, from 0, with that sensor's film, samples and seed.
+def seen_by(scene: Scene, sensor: View) -> Scene:
+    """The scene as a sensor sees it, with that sensor's film, samples and seed.
 
-    Raises OptionError for a number that none has.
+    sensor : the number of one of its own, from 0; or a dict.  One with a "type" is a sensor as `load_dict`
+        takes it; without a film and a sampler of its own it has the scene's.  One without changes the scene's
+        sensor, by the names of `clvol.traverse`: ``{"to_world": …}``.
+
+    Raises OptionError for a number that none has, and SceneError for a dict that is no sensor.
     """
+    if isinstance(sensor, Mapping):
+        view = _described(scene, sensor)
+        return replace(
+            scene, sensor=view.camera, film=view.film, spp=view.sampler.spp, seed=view.sampler.seed
+        )
     count = len(scene.sensors)
     try:
         number = operator.index(sensor)
     except TypeError:
-        raise OptionError(f"sensor must be a number, not {shown(sensor)}") from None
+        hint = "give the number of one of the scene's sensors, or a dict"
+        raise OptionError(f"sensor must be a number or a dict, not {shown(sensor)}", hint=hint) from None
     if not 0 <= number < count:
         have = "one sensor, number 0" if count == 1 else f"{count} sensors, numbered from 0"
         raise OptionError(f"there is no sensor {number}: the scene has {have}", scene.source)
     view = scene.sensors[number]
     return replace(scene, sensor=view.camera, film=view.film, spp=view.sampler.spp, seed=view.sampler.seed)
+
+
+def _described(scene: Scene, given: Mapping[str, Any]) -> Sensor:
+    now = Sensor(scene.sensor, scene.film, Sampler(scene.spp, scene.seed))
+    if "type" not in given:
+        return sensor_with(now, given)
+    found, own = load_sensor(given)
+    return replace(
+        found,
+        film=found.film if "film" in own else now.film,
+        sampler=found.sampler if "sampler" in own else now.sampler,
+    )
 
 
 def in_size(scene: Scene, size: tuple[int, int]) -> Scene:
