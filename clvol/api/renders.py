@@ -32,41 +32,7 @@ def render(scene: Scene, *, sensor: list[View] | tuple[View, ...], **options: An
 
 
 @overload
-def render(
-    scene: Scene,
-    *,
-    spp: int | None = None,
-    seed: int | None = None,
-    sensor: View | None = None,
-    size: tuple[int, int] | None = None,
-    technique: str = "auto",
-    transmittance: str = "auto",
-    majorant: str = "auto",
-    lookup: str = "auto",
-    absorption: str = "auto",
-    gathering: str = "auto",
-    roulette: str = "auto",
-    background: str = "auto",
-    probability: str = "auto",
-    control: str = "auto",
-    sampler: str = "auto",
-    shadow_cache: str = "auto",
-    light_choice: str = "auto",
-    next_event: str = "auto",
-    lanes: str = "auto",
-    majorant_scale: float = 1.0,
-    step: float | None = None,
-    aov: Sequence[str] = (),
-    denoise: bool = False,
-    time_limit: float | None = None,
-    target_error: float | None = None,
-    device: str | None = None,
-    progress: bool | ProgressCallback = False,
-    samples: tuple[int, int] | None = None,
-    resume: Result | str | PathLike[str] | None = None,
-    pool: int | None = None,
-    profile: bool = False,
-) -> Result: ...
+def render(scene: Scene, *, sensor: View | None = None, **options: Any) -> Result: ...
 
 
 def render(  # type: ignore[misc]  # the options of several views are those of one
@@ -96,6 +62,7 @@ def render(  # type: ignore[misc]  # the options of several views are those of o
     aov: Sequence[str] = (),
     time_limit: float | None = None,
     target_error: float | None = None,
+    denoise: bool = False,
     device: str | None = None,
     progress: bool | ProgressCallback = False,
     samples: tuple[int, int] | None = None,
