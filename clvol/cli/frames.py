@@ -133,6 +133,7 @@ class Series:
     console: Console
     fps: float
     _turned: Source | None = None  # the volume on the turntable is read once
+    _told: bool = False  # what was chosen for all frames
 
     def run(self) -> None:
         """Render all frames; exits with 1 where some failed, and as the signal says that ended it."""
@@ -184,8 +185,9 @@ class Series:
             self._turned = Source.of(frame.name)
         asked = replace(self.asked, name=frame.name)
         scene, lines = asked.open(self.size, self._turned, fixed, frame.turn)
-        if place == 0 and lines and not self.quiet:
+        if not self._told and not self.quiet:
             mention(lines)
+        self._told = True
         result = self.render(scene, frame.outputs)
         if not self.quiet:
             from clvol.base.progress import format_noise

@@ -104,7 +104,11 @@ class Shown:
             check_picture(output, view)
         if component is not None and all(component_of(suffix, component) != component for suffix in suffixes):
             check_component(suffixes[0], component)
-        if view != View() and all(is_linear(component_of(suffix, component)) for suffix in suffixes):
+        if (
+            outputs
+            and view != View()
+            and all(is_linear(component_of(suffix, component)) for suffix in suffixes)
+        ):
             names = {"--exposure": self.exposure, "--display": self.display}
             given = next((name for name, value in names.items() if value), "--view-transform")
             raise click.UsageError(

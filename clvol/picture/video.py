@@ -92,7 +92,8 @@ class Film:
 
     def __exit__(self, *exception: object) -> None:
         try:
-            if self._process is not None and exception[0] is None:
+            failed = isinstance(exception[1], Exception)  # Ctrl-C leaves a shorter film
+            if self._process is not None and not failed:
                 self._end()
         finally:
             if self._process is not None and self._process.poll() is None:

@@ -271,7 +271,18 @@ def test_a_film_has_every_frame(folder: Path) -> None:
     ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="the extra 'video' is not installed")
     shutil.copy("smoke.0004.npz", "smoke.0003.npz")
     outcome = run(
-        "render", "smoke.####.npz", "-o", "smoke.mp4", "--size", "25x17", "--spp", "1", "--fps", "10"
+        "render",
+        "smoke.####.npz",
+        "-o",
+        "smoke.mp4",
+        "--size",
+        "25x17",
+        "--spp",
+        "1",
+        "--fps",
+        "10",
+        "--exposure",
+        "1",
     )
     assert outcome.exit_code == 0, outcome.output
     frames = ffmpeg.read_frames(str(folder / "smoke.mp4"))
@@ -308,3 +319,16 @@ def test_ffmpeg_s_failure_is_told_and_leaves_no_film(tmp_path: Path) -> None:
     with pytest.raises(OptionError, match="ffmpeg failed"):
         filmed(tmp_path / "b.mp4", (4, 4), ffmpeg="/bin/false")
     assert not (tmp_path / "b.mp4").exists()
+
+
+def test_ctrl_c_leaves_a_shorter_film(tmp_path: Path) -> None:
+    ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="the extra 'video' is not installed")
+    path = tmp_path / "a.mp4"
+
+    def pressed() -> None:
+        with Film(path) as film:
+            film.add(np.zeros((4, 4, 3), np.uint8))
+            raise KeyboardInterrupt
+
+    pytest.raises(KeyboardInterrupt, pressed)
+    assert len(list(ffmpeg.read_frames(str(path)))) == 2  # what it is, and its frame
