@@ -16,6 +16,7 @@ from clvol.cli.ray import ray
 from clvol.cli.render import render
 from clvol.cli.scene import scene
 from clvol.cli.selftest import selftest
+from clvol.cli.view import view
 
 EXAMPLES = """
 \b
@@ -47,7 +48,7 @@ def main(ctx: click.Context) -> None:
         click.echo(ctx.get_help())
 
 
-for command in (render, scene, merge, info, devices, selftest, ray, compare):
+for command in (render, scene, merge, info, devices, selftest, ray, compare, view):
     main.add_command(command)
 
 if __name__ == "__main__":

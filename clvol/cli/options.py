@@ -80,6 +80,25 @@ class Definition(_OptionType):
         return name, text
 
 
+class Assignment(_OptionType):
+    """A `NAME=value` pair that sets a parameter of a scene."""
+
+    name = "name=value"
+
+    def convert(
+        self, value: str | tuple[str, str], param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, str]:
+        """Split at the first "="; `clvol.scene.assignments` says what may stand there."""
+        if isinstance(value, tuple):
+            return value
+        name, equals, text = value.partition("=")
+        if not (equals and name.strip()):
+            raise OptionError(
+                f"--set takes NAME=VALUE, not '{value}'", hint="for example --set sensor.x_fov=30"
+            )
+        return name.strip(), text
+
+
 class SampleRange(_OptionType):
     """First sample and how many, as "4,12"."""
 
@@ -135,6 +154,14 @@ definitions_option = click.option(
     multiple=True,
     metavar="NAME=VALUE",
     help="Fill $NAME in the scene.",
+)
+assignments_option = click.option(
+    "--set",
+    "assignments",
+    type=Assignment(),
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Set a parameter of the scene, as clvol.traverse names it; may be given several times.",
 )
 device_option = click.option(
     "--device", metavar="PATTERN", help="Part of the device's name; see clvol devices."

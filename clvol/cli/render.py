@@ -16,6 +16,7 @@ from clvol.cli.options import (
     ExplainedCommand,
     SampleRange,
     Size,
+    assignments_option,
     definitions_option,
     device_option,
     family_options,
@@ -50,6 +51,7 @@ Examples:
   clvol render scenes/cloud.xml -o cloud.exr -o cloud.png --spp 256
   clvol render scenes/cloud.xml -o cloud.exr --time 20 -v
   clvol render scenes/cloud.xml -o cloud.exr -D res=512 --majorant global
+  clvol render scenes/cloud.xml -o near.png --set sensor.x_fov=20 --set shape.interior.scale=80
   clvol render scenes/cloud.xml -o cloud.exr --technique decomposition --transmittance residual-ratio
   clvol render scenes/smoke.xml -o smoke.exr --technique auto:pilot
   clvol render scenes/cloud.xml -o cloud.exr --target-error 0.01
@@ -135,6 +137,7 @@ class RenderCommand(ExplainedCommand):
 @click.option("--seed", type=click.IntRange(min=0), help="Same seed, same bits; the scene's own by default.")
 @device_option
 @definitions_option
+@assignments_option
 @picture_options
 @click.option(
     "-v",
@@ -216,7 +219,9 @@ class Painter:
         if piloted:
             from clvol.lab.repeat import with_definitions
 
-            result.metadata["repeat"] = with_definitions(result.metadata["repeat"], self.asked.definitions)
+            result.metadata["repeat"] = with_definitions(
+                result.metadata["repeat"], self.asked.definitions, self.asked.assignments
+            )
         return result
 
     def frame(self, scene: Scene, outputs: Sequence[str]) -> Result:

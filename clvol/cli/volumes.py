@@ -82,12 +82,14 @@ class Asked:
     """What the command line names to be rendered, and what it says of how that is shown.
 
     given : options of `clvol.staging.options` that were given.  definitions : what -D fills into a scene.
+    assignments : what --set sets in it.
     """
 
     name: str
     is_volume: bool
     given: dict[str, Any]
     definitions: dict[str, str]
+    assignments: tuple[tuple[str, str], ...] = ()
 
     @classmethod
     def taken(cls, name: str, options: dict[str, Any], definitions: Sequence[tuple[str, str]]) -> Asked:
@@ -112,7 +114,7 @@ class Asked:
         for option in () if volume else given:
             if option != "background":
                 raise click.UsageError(f"{spelled(option)} is for volumes, and this is a scene")
-        return cls(name, volume, given, dict(definitions))
+        return cls(name, volume, given, dict(definitions), options.pop("assignments"))
 
     def open(
         self,
@@ -130,12 +132,20 @@ class Asked:
 
         if self.is_volume:
             staged = stage(source or Source.of(self.name), self.given, size_of(size), fixed=fixed, turn=turn)
-            return staged.load(), staged.lines
+            return self._set(staged.load()), staged.lines
         import clvol
         from clvol.scene.views import before
 
-        scene = clvol.load_file(self.name, **self.definitions)
+        scene = self._set(clvol.load_file(self.name, **self.definitions))
         return (before(scene, self.given["background"]) if self.given else scene), ()
+
+    def _set(self, scene: Scene) -> Scene:
+        """The scene with its parameters as --set says."""
+        if self.assignments:
+            from clvol.scene.assignments import assign
+
+            assign(scene, self.assignments)
+        return scene
 
 
 def size_of(size: tuple[int, int] | None) -> tuple[int, int]:

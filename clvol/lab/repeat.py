@@ -9,7 +9,7 @@ from clvol.lab.combinations import unbiased
 from clvol.lab.pilot import CHOSEN
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from clvol.scene.records import Scene
 
@@ -44,7 +44,10 @@ def repeat_command(scene: Scene, chosen: str, options: Mapping[str, Any]) -> str
     return shlex.join(words)
 
 
-def with_definitions(command: str, definitions: Mapping[str, str]) -> str:
-    """The command with what `-D` filled into the scene."""
+def with_definitions(
+    command: str, definitions: Mapping[str, str], assignments: Iterable[tuple[str, str]] = ()
+) -> str:
+    """The command with what `-D` filled into the scene, and what `--set` set in it."""
     words = [word for name, value in definitions.items() for word in ("-D", f"{name}={value}")]
+    words += [word for name, value in assignments for word in ("--set", f"{name}={value}")]
     return " ".join([command, *map(shlex.quote, words)])
