@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     )
     from clvol.scene.records import Scene
     from clvol.staging.stage import volume_scene
+    from clvol.staging.transfer import transfer
     from clvol.volumes.loading import load_volume
 
 __all__ = [
@@ -78,6 +79,7 @@ __all__ = [
     "scale",
     "selftest",
     "trace_ray",
+    "transfer",
     "translate",
     "traverse",
     "volume_scene",
@@ -109,6 +111,7 @@ _MODULES = {
     ],
     "clvol.scene.records": ["Scene"],
     "clvol.staging.stage": ["volume_scene"],
+    "clvol.staging.transfer": ["transfer"],
     "clvol.volumes.loading": ["load_volume"],
 }
 """The imports above, for those that run clvol rather than read it."""

@@ -1,8 +1,10 @@
 /* A ray through a sampled density, segment by segment: between the planes of the samples (of the cells half-way
    between them, for a nearest filter) the density is a polynomial of the ray parameter, of degree 3
-   for a trilinear filter, so that two Gauss-Legendre points integrate it exactly (METHODS §3, regular). */
+   for a trilinear filter, so that two Gauss-Legendre points integrate it exactly (METHODS §3, regular).  With a
+   transfer function it is one for a nearest filter alone. */
 #ifndef CLVOL_DENSITY_SEGMENTS_H
 #define CLVOL_DENSITY_SEGMENTS_H
+#include "density/transfer.h"
 #include "density/volume.h"
 #include "tracking/walk.h"
 
@@ -77,9 +79,10 @@ INLINE Extinction segment_value(const MediumRay *in, const SegmentCell *at, floa
     cell.fy = clamp_to(place.y, 0.0f, 1.0f);
     cell.fz = clamp_to(place.z, 0.0f, 1.0f);
 #if CLVOL_EXTINCTION == 3 && CLVOL_HAS_COLOURED_VOLUME
-    return in->scale * cell_value3(&cell, at->nearest);
+    return in->scale * density3_of(in->scene, in->medium, cell_value3(&cell, at->nearest));
 #else
-    return in->scale * cell_value(&cell, at->nearest, cell.stride > 1 ? in->channel : 0);
+    const float value = cell_value(&cell, at->nearest, cell.stride > 1 ? in->channel : 0);
+    return in->scale * density_of(in->scene, in->medium, value);
 #endif
 }
 

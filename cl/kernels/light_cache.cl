@@ -2,6 +2,7 @@
    and from it the transmittance from the middle of a cell to every light.
 
    Nothing here has to be exact: whatever the cache holds, the picture's mean is the same. */
+#include "density/transfer.h"
 #include "density/volume.h"
 #include "emitter/light_cache.h"
 #include "stages/medium_ray.h"
@@ -38,8 +39,8 @@ INLINE float least_extinction(const Scene *scene, float3 p)
         if (is_homogeneous(medium) || !medium_holds(medium, p))
             continue;
         __global const Volume *volume = scene->volumes + medium->sigma_t_volume;
-        extinction += load_vector(medium->sigma_t) *
-                      volume_value3(scene, volume, transform_point(volume->world_to_index, p));
+        const float3 value = volume_value3(scene, volume, transform_point(volume->world_to_index, p));
+        extinction += load_vector(medium->sigma_t) * density3_of(scene, medium, value);
     }
     return min_of(extinction.x, min_of(extinction.y, extinction.z));
 }

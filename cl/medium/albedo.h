@@ -3,7 +3,7 @@
 #define CLVOL_MEDIUM_ALBEDO_H
 #include "core/scene.h"
 #if CLVOL_HAS_ALBEDO_VOLUME
-#include "density/volume.h"
+#include "medium/spectrum.h"
 #endif
 
 /* At world point p. */
@@ -12,7 +12,7 @@ INLINE Spectrum medium_albedo(const Scene *scene, __global const Medium *medium,
 #if CLVOL_HAS_ALBEDO_VOLUME
     if (medium->albedo_volume >= 0) {
         __global const Volume *volume = scene->volumes + medium->albedo_volume;
-        return volume_spectrum(scene, volume, transform_point(volume->world_to_index, p), channel);
+        return medium_spectrum(scene, medium, TRANSFER_ALBEDO, volume, p, channel);
     }
 #endif
     return to_spectrum(load_vector(medium->albedo), channel);

@@ -3,7 +3,7 @@
 #define CLVOL_MEDIUM_EMISSION_H
 #include "core/scene.h"
 #if CLVOL_HAS_EMISSION_VOLUME || CLVOL_HAS_TEMPERATURE
-#include "density/volume.h"
+#include "medium/spectrum.h"
 #endif
 #include "medium/albedo.h"
 
@@ -28,7 +28,7 @@ INLINE Spectrum medium_radiance(const Scene *scene, __global const Medium *mediu
 #if CLVOL_HAS_EMISSION_VOLUME
     if (medium->emission_volume >= 0) {
         __global const Volume *volume = scene->volumes + medium->emission_volume;
-        radiance *= volume_spectrum(scene, volume, transform_point(volume->world_to_index, p), channel);
+        radiance *= medium_spectrum(scene, medium, TRANSFER_EMISSION, volume, p, channel);
     }
 #endif
 #if CLVOL_HAS_TEMPERATURE

@@ -1,6 +1,7 @@
 /* What trackers see along one ray: sigma_t at even steps, (channels, points), and, of a majorant that they walk,
    each cell's segment, bound and controls (t, t_end, majorant, control (3), residual control (3), its rate). */
 #if CLVOL_HAS_HETEROGENEOUS
+#include "density/transfer.h"
 #include "density/volume.h"
 #endif
 #include "ray/given.h"
@@ -24,8 +25,9 @@ __kernel void tables(CLVOL_ARGUMENTS, __global const float *given, __global floa
 #if CLVOL_HAS_HETEROGENEOUS
             __global const Volume *volume = scene.volumes + in.medium->sigma_t_volume;
             if (!is_homogeneous(in.medium))
-                sigma[c * points + i] = scale *
-                                        volume_value(&scene, volume, in.index_ray.o + t * in.index_ray.d, (int)c);
+                sigma[c * points + i] = scale * density_of(&scene, in.medium,
+                                                           volume_value(&scene, volume,
+                                                                        in.index_ray.o + t * in.index_ray.d, (int)c));
             else
 #endif
                 sigma[c * points + i] = scale;

@@ -6,6 +6,7 @@
 #define CLVOL_TRACKING_WALK_H
 #include "core/random.h"
 #include "density/lookup.h"
+#include "density/transfer.h"
 #include "tracking/interface.h"
 #include "tracking/probability.h"
 #include "tracking/record.h"
@@ -46,9 +47,11 @@ INLINE Extinction extinction_at(const MediumRay *in, float3 p, Stream *stream, T
     __global const Volume *volume = in->scene->volumes + in->medium->sigma_t_volume;
     tally->lookups += 1;
 #if CLVOL_EXTINCTION == 3 && CLVOL_HAS_COLOURED_VOLUME
-    const Extinction sigma_t = in->scale * density3(in->scene, volume, p, stream);
+    const float3 made = density3_of(in->scene, in->medium, density3(in->scene, volume, p, stream));
+    const Extinction sigma_t = in->scale * made;
 #else
-    const Extinction sigma_t = in->scale * density(in->scene, volume, p, in->channel, stream);
+    const float value = density(in->scene, volume, p, in->channel, stream);
+    const Extinction sigma_t = in->scale * density_of(in->scene, in->medium, value);
 #endif
     RECORD_LOOKUP(in, p, sigma_t, tally);
     return sigma_t;

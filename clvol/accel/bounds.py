@@ -15,10 +15,14 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from clvol.volumes.transfer import Transfer
+
 SLACK = np.float32(2.0**-10)
 """A float position on a ray may lie this fraction of a voxel beyond the cell it was computed for, in lattices
 of up to SLACK_SIZE voxels an axis; the fraction grows with their size."""
 SLACK_SIZE = 4096
+_VALUE_ROUNDING = 2.0**-20
+"""Share of the largest magnitude by which the interpolation of values of any sign may round."""
 _ROUNDING = np.float32(1 + 2.0**-20)
 """Interpolation rounds: its result may exceed its largest input by a few units in the last place."""
 
@@ -84,27 +88,56 @@ def _merged_mean(values: np.ndarray) -> np.ndarray:
 
 
 def with_slack(
-    minimum: np.ndarray, maximum: np.ndarray, cell_size: float, mean: np.ndarray | None = None
+    minimum: np.ndarray,
+    maximum: np.ndarray,
+    cell_size: float,
+    mean: np.ndarray | None = None,
+    transfer: Transfer | None = None,
 ) -> Bounds:
     """Bounds that also hold `SLACK` of a voxel beyond each cell, and after rounding; `mean` as it is.
+
+    transfer : what is made of the interpolated values whose extrema are given, and then bounded.
 
     The field changes by at most (neighbour's extremum - own) over one voxel into the neighbour.
     A cell that is exactly 0 in every channel stays 0, so that empty space is skipped.
     """
     around = _neighbourhood(minimum, np.minimum), _neighbourhood(maximum, np.maximum)
-    return Bounds(*slackened(minimum, maximum, *around, max(minimum.shape[:3]) * cell_size), cell_size, mean)
+    size = max(minimum.shape[:3]) * cell_size
+    return Bounds(*slackened(minimum, maximum, *around, size, transfer), cell_size, mean)
 
 
 def slackened(
-    minimum: np.ndarray, maximum: np.ndarray, least: np.ndarray, most: np.ndarray, size: float
+    minimum: np.ndarray,
+    maximum: np.ndarray,
+    least: np.ndarray,
+    most: np.ndarray,
+    size: float,
+    transfer: Transfer | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Extrema (..., channels) with slack; `least`, `most` are over neighbours too; `size`: in voxels."""
     slack = SLACK * np.float32(max(1.0, size / SLACK_SIZE))
     high = maximum + slack * (most - maximum)
     low = minimum + slack * (least - minimum)
+    if transfer is not None:
+        holds_matter = transfer.extrema(minimum, maximum)[1] > 0
+        least, bound = classified(low, high, transfer)
+        return np.where(holds_matter, least, 0), np.where(holds_matter, bound, 0)
     holds_matter = over_channels(maximum, np.maximum)[..., None] > 0
     high = np.where(holds_matter, high * _ROUNDING, np.float32(0)).astype(np.float32)
     return np.maximum(low / _ROUNDING, np.float32(0)).astype(np.float32), high
+
+
+def classified(low: np.ndarray, high: np.ndarray, transfer: Transfer) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of what a transfer function makes of values in [low, high], as devices compute it: float32.
+
+    Interpolating samples that differ rounds, and so does the function, by some of its largest value.  What is
+    exactly 0 over the whole range stays 0, so that empty space is skipped.
+    """
+    reach = np.where(high > low, np.maximum(np.abs(low), np.abs(high)) * _VALUE_ROUNDING, 0)
+    least, most = transfer.extrema(low.astype(np.float64) - reach, high.astype(np.float64) + reach)
+    rounding = _VALUE_ROUNDING * transfer.largest
+    bound = np.where(most > 0, most * float(_ROUNDING) + rounding, 0)
+    return np.maximum(least / float(_ROUNDING) - rounding, 0).astype(np.float32), bound.astype(np.float32)
 
 
 def _neighbourhood(values: np.ndarray, combine: np.ufunc) -> np.ndarray:

@@ -18,6 +18,7 @@ from clvol.accel.cells import Cells
 from clvol.base.types import triple
 from clvol.layout import BRICK_CELLS
 from clvol.volumes.brick_samples import BOUND_CELLS
+from clvol.volumes.transfer import made_of
 from clvol.volumes.tree import (
     NODE_EDGE,
     Tier,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from clvol.volumes.brick_tree import BrickTree
+    from clvol.volumes.transfer import Transfer
 
 _CHUNK = 1024
 _CORNERS = np.array(list(np.ndindex(2, 2, 2)))
@@ -74,6 +76,7 @@ class SparseBounds:
     inside : bounds of their cells, (n, 8, 8, 8, channels).
     cells : cells per axis, x y z.  cell_size : a cell's edge in index units.
     constant : the field at places of bricks, int (..., 3), outside of all blocks: float32 (..., channels).
+    transfer : what is made of its values, and bounded.
     """
 
     blocks: np.ndarray
@@ -81,6 +84,7 @@ class SparseBounds:
     cells: tuple[int, int, int]
     cell_size: float
     constant: Callable[[np.ndarray], np.ndarray]
+    transfer: Transfer | None = None
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -104,7 +108,7 @@ class SparseBounds:
                 part[at] = value[:, None, None, None]
                 part[at][found] = own[row[found, number]]
         inside = _masked(parts, _sides(blocks, shape))
-        return SparseBounds(blocks, inside, shape[::-1], 2 * self.cell_size, self.constant)
+        return SparseBounds(blocks, inside, shape[::-1], 2 * self.cell_size, self.constant, self.transfer)
 
     def whole(self) -> Bounds:
         """The same over a single cell that holds all."""
@@ -149,21 +153,26 @@ class SparseBounds:
 
     def _constants(self, bricks: np.ndarray) -> Cells:
         values = self.constant(bricks)
-        low, high = slackened(values, values, values, values, 0.0)
-        return Cells(low, high, None if self.inside.mean is None else values)
+        low, high = slackened(values, values, values, values, 0.0, self.transfer)
+        if self.inside.mean is None:
+            return Cells(low, high, None)
+        return Cells(low, high, made_of(values, self.transfer))
 
 
-def sparse_bounds(bricks: BrickTree, means: bool) -> SparseBounds:
-    """Bounds with slack (clvol.accel.bounds) over the halves of a tree's bricks, with means if wanted."""
+def sparse_bounds(bricks: BrickTree, means: bool, transfer: Transfer | None = None) -> SparseBounds:
+    """Bounds with slack (clvol.accel.bounds) over the halves of a tree's bricks, with means if wanted.
+
+    transfer : what is made of the interpolated values, and then bounded.
+    """
     shape = triple(2 * n for n in bricks.shape)
     last = (np.array(shape) - 1) // NODE_EDGE
     reach = [np.clip((2 * bricks.places + offset) // NODE_EDGE, 0, last) for offset in 3 * _CORNERS - 1]
     blocks, _ = unique_places(np.concatenate([np.zeros((1, 3), np.int64), *reach]))
-    halves = Cells(bricks.minimum, bricks.maximum, bricks.means() if means else None)
+    halves = Cells(bricks.minimum, bricks.maximum, bricks.means(transfer) if means else None)
     inside = _like(halves, len(blocks))
     for first in range(0, len(blocks), _CHUNK):
         rows = slice(first, first + _CHUNK)
-        own = _slack_inside(bricks, halves, blocks[rows], max(shape) * BOUND_CELLS)
+        own = _slack_inside(bricks, halves, blocks[rows], max(shape) * BOUND_CELLS, transfer)
         for part, values in zip(inside.arrays(), own.arrays(), strict=True):
             part[rows] = values
 
@@ -171,7 +180,7 @@ def sparse_bounds(bricks: BrickTree, means: bool) -> SparseBounds:
         return bricks.standing.constant(places)
 
     inside = _masked(inside, _sides(blocks, shape))
-    return SparseBounds(blocks, inside, shape[::-1], BOUND_CELLS, constant)
+    return SparseBounds(blocks, inside, shape[::-1], BOUND_CELLS, constant, transfer)
 
 
 def from_dense(bounds: Bounds) -> SparseBounds:
@@ -194,7 +203,9 @@ def from_dense(bounds: Bounds) -> SparseBounds:
     return SparseBounds(blocks, inside, bounds.cells, bounds.cell_size, constant)
 
 
-def _slack_inside(bricks: BrickTree, halves: Cells, blocks: np.ndarray, size: int) -> Cells:
+def _slack_inside(
+    bricks: BrickTree, halves: Cells, blocks: np.ndarray, size: int, transfer: Transfer | None
+) -> Cells:
     """Bounds of the cells of blocks: 4³ bricks each, and the layer of cells around them."""
     per_block = NODE_EDGE // 2
     around = np.stack(np.meshgrid(*[np.arange(-1, per_block + 1)] * 3, indexing="ij"), axis=-1)
@@ -202,19 +213,22 @@ def _slack_inside(bricks: BrickTree, halves: Cells, blocks: np.ndarray, size: in
     row = bricks.find(places)
     constant = bricks.standing.constant(places)[..., None, None, None, :]
 
-    def spread(values: np.ndarray) -> np.ndarray:
+    def spread(values: np.ndarray, constant: np.ndarray = constant) -> np.ndarray:
         cells = np.broadcast_to(constant, (*row.shape, *values.shape[1:])).copy()
         cells[row >= 0] = values[row[row >= 0]]
         edge = 2 * row.shape[1]
         cells = cells.transpose(0, 1, 4, 2, 5, 3, 6, 7).reshape(len(blocks), edge, edge, edge, -1)
         return cells[:, 1:-1, 1:-1, 1:-1]
 
-    wide = halves.each(spread)
+    wide = Cells(spread(halves.minimum), spread(halves.maximum), None)
     # at the lattice's border the clipped place repeats the border's own two cells: no other extremum
     least, most = _around(wide.minimum, np.minimum), _around(wide.maximum, np.maximum)
     inner = wide.at(np.s_[:, 1:-1, 1:-1, 1:-1])
-    low, high = slackened(inner.minimum, inner.maximum, least, most, size)
-    return Cells(low, high, inner.mean)
+    low, high = slackened(inner.minimum, inner.maximum, least, most, size, transfer)
+    mean = None
+    if halves.mean is not None:
+        mean = spread(halves.mean, made_of(constant, transfer))[:, 1:-1, 1:-1, 1:-1]
+    return Cells(low, high, mean)
 
 
 def _around(values: np.ndarray, combine: np.ufunc) -> np.ndarray:

@@ -59,6 +59,7 @@ from clvol.layout.records import (
     RENDER,
     SHAPE,
     TEXTURE,
+    TRANSFER,
     VOLUME,
     enum,
 )
@@ -112,6 +113,7 @@ __all__ = [
     "SLOT_STATISTICS",
     "STAGES",
     "TEXTURE",
+    "TRANSFER",
     "VOLUME",
     "Argument",
     "BsdfFacts",

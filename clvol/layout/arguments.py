@@ -38,6 +38,8 @@ ARGUMENTS = (
     Argument("kd_nodes", "__global const uint2 *", "CLVOL_WALKS_KDTREE"),
     Argument("controls", "__global const float *", "CLVOL_HAS_CONTROLS"),
     Argument("residuals", "__global const float *", "CLVOL_HAS_RESIDUALS"),
+    Argument("transfers", "__global const Transfer *", "CLVOL_HAS_TRANSFER"),
+    Argument("transfer_points", "__global const float4 *", "CLVOL_HAS_TRANSFER"),  # value and colour
     Argument("blackbody", "__global const float *", "CLVOL_HAS_TEMPERATURE"),
     Argument("phases", "__global const Phase *", "CLVOL_HAS_SCATTERING"),
     Argument("emitters", "__global const Emitter *", "CLVOL_HAS_EMITTERS"),

@@ -60,6 +60,12 @@ MEDIUM = _record(
     ("kd_root", "i", 1),  # first entry in `kd_nodes`
     ("links_first", "i", 1),  # first entry in `majorant_links`
     ("links_levels", "i", 1),  # and levels of that tree
+    ("transfer", "i", 1),  # first of its three entries in `transfers`; -1: no value is classified
+)
+
+TRANSFER = _record(
+    ("first", "u", 1),  # first entry in `transfer_points`
+    ("count", "u", 1),  # of its points, at least 2; 0: what it is for is not made of values
 )
 
 PHASE = _record(
@@ -186,6 +192,7 @@ RENDER = _record(
 RECORDS = {
     "Volume": VOLUME,
     "Medium": MEDIUM,
+    "Transfer": TRANSFER,
     "Phase": PHASE,
     "Emitter": EMITTER,
     "LightCache": LIGHT_CACHE,
@@ -200,6 +207,7 @@ RECORDS = {
 ENUMS = {
     "SHAPE": ("NONE", "CUBE", "SPHERE"),
     "PHASE": ("ISOTROPIC", "HG", "RAYLEIGH"),
+    "TRANSFER": ("SIGMA_T", "ALBEDO", "EMISSION"),  # in the order of a medium's entries
     "EMITTER": ("CONSTANT", "ENVMAP", "DIRECTIONAL", "POINT", "SPOT", "AREA"),
     "SURFACE": ("MESH", "SPHERE", "DISK", "CYLINDER"),
     "QUADRIC": ("SPHERE", "DISK", "CYLINDER"),

@@ -83,6 +83,7 @@ def _technique(features: Features, asked: Mapping[str, str]) -> tuple[str, str]:
         "media may overlap": features.media_overlap,
         "channels are attenuated differently": features.chromatic_extinction,
         "samples are independent": not SAMPLERS[sampler].low_discrepancy,
+        "densities are classified after they are interpolated": features.interpolated_transfers,
         "look-ups are stochastic": asked["lookup"] == "stochastic",
     }
     against = [reason for reason, holds in hurdles.items() if holds]

@@ -49,6 +49,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_FLIGHT_STRATA": plan.flight_strata,
         "CLVOL_HAS_EMISSION_VOLUME": int(f.emission_volumes),
         "CLVOL_HAS_TEMPERATURE": int(f.temperature),
+        "CLVOL_HAS_TRANSFER": int(f.transfers),
         **{f"CLVOL_PHASE_{name}": int(name in f.phases) for name in layout.ENUMS["PHASE"]},
         "CLVOL_HAS_BLEND": int(f.blend),
         "CLVOL_HAS_SCATTERING": int(f.scattering),

@@ -34,6 +34,8 @@ class Features:
     emission: bool = False
     emission_volumes: bool = False
     temperature: bool = False
+    transfers: bool = False
+    interpolated_transfers: bool = False
     only_dark_emitters: bool = False
     trilinear: bool = False
     nearest: bool = False

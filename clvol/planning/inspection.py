@@ -23,8 +23,9 @@ from clvol.scene.material_facts import is_grey as bsdf_is_grey
 from clvol.scene.medium_facts import (
     bounding_kind,
     channels_of,
+    classifies,
     is_dark_emitter,
-    is_grey,
+    is_grey_of,
     is_homogeneous,
     medium_volumes,
     scatters,
@@ -85,14 +86,14 @@ def _medium_features(media: list[records.Medium]) -> dict[str, Any]:
         "media": len(media),
         "homogeneous": any(is_homogeneous(m) for m in media),
         "heterogeneous": bool(varied),
-        "chromatic_extinction": any(not is_grey(m.sigma_t) or len(set(m.scale)) > 1 for m in media),
+        "chromatic_extinction": any(not is_grey_of(m, "sigma_t") or len(set(m.scale)) > 1 for m in media),
         "coloured_extinction": any(
             isinstance(m.sigma_t, records.GridVolume) and channels_of(m.sigma_t) > 1 for m in media
         ),
-        "chromatic_albedo": any(not is_grey(m.albedo) for m in media),
+        "chromatic_albedo": any(not is_grey_of(m, "albedo") for m in media),
         "chromatic_emission": any(
             m.temperature is not None
-            or (m.emission is not None and not is_grey(m.emission))
+            or (m.emission is not None and not is_grey_of(m, "emission"))
             or len(set(m.emission_scale)) > 1
             for m in emissive
         ),
@@ -100,6 +101,8 @@ def _medium_features(media: list[records.Medium]) -> dict[str, Any]:
         "emission": bool(emissive),
         "emission_volumes": any(isinstance(m.emission, records.GridVolume) for m in emissive),
         "temperature": any(isinstance(m.temperature, records.GridVolume) for m in emissive),
+        "transfers": any(m.transfers is not None for m in media),
+        "interpolated_transfers": any(map(classifies, media)),
         "only_dark_emitters": bool(varied) and all(map(is_dark_emitter, varied)),
         "phases": tuple(sorted(kind.upper() for kind in phases)),
         "blend": any(len(mixture) > 1 for mixture in lobes),

@@ -24,6 +24,7 @@ def _against_any(plan: Decisions) -> str:
         "there are several media": features.media > 1,
         f"a majorant {majorant} is walked one path at a time": majorant in registry.MAJORANTS
         and not registry.MAJORANTS[majorant].in_lanes,
+        "a transfer function classifies the density": features.transfers,
         "the volume is a tree": settled is not None and (settled.top_trees or settled.tree_grid),
         "one path follows several channels": plan.extinction == 3,
     }

@@ -34,11 +34,22 @@ def refuse_impossible(features: Features, choices: Choices, chosen: Mapping[str,
     used = [("technique", technique, tracker, "weighted-delta")]
     if features.samples_lights and features.scattering:
         used.append(("transmittance", transmittance, estimator, "ratio"))
+    if features.interpolated_transfers and chosen["lookup"] == "stochastic":
+        raise OptionError(
+            "stochastic look-ups would bias a transfer function, which classifies interpolated values",
+            hint="use lookup exact, or a volume with filter_type nearest",
+        )
     for family, name, choice, instead in used:
         if choices.majorant_scale < 1 and choice.needs_bound:
             raise OptionError(
                 f"{family} {name!r} is biased where bounds are too low, as by a majorant_scale below 1",
                 hint=f"use one that carries weights, such as {instead}",
+            )
+        if features.interpolated_transfers and choice.interpolated:
+            raise OptionError(
+                f"{family} {name!r} integrates interpolated samples, and a transfer function makes something "
+                "else of them",
+                hint=f"use {instead}, or a volume with filter_type nearest",
             )
         if chosen["lookup"] == "stochastic" and not choice.linear:
             raise OptionError(

@@ -27,6 +27,7 @@ class Choice:
     control : what each majorant cell must carry beside its bound: "min" of the density, or "fitted".
     walks_majorant : it walks majorant cells at all.
     linear : it uses the density of a look-up once and linearly, so that a stochastic look-up may replace it.
+    interpolated : it integrates the interpolant of the samples, which a transfer function changes.
     biased : its pictures are labelled as biased.
     low_discrepancy : a pixel's samples depend on each other, and are dealt to parts that tell their error.
     in_lanes : walks by it may go side by side, too (clvol.planning.lanes).
@@ -40,6 +41,7 @@ class Choice:
     control: Control = "none"
     walks_majorant: bool = True
     linear: bool = True
+    interpolated: bool = False
     biased: bool = False
     low_discrepancy: bool = False
     in_lanes: bool = False
@@ -85,6 +87,7 @@ TECHNIQUES = {
         "tracking/regular.h",
         all_channels=True,
         linear=False,
+        interpolated=True,
     ),
     "marching": Choice(
         "BIASED baseline: fixed steps (--step) of constant density",
@@ -109,7 +112,10 @@ TRANSMITTANCES = {
         "tracking/residual_ratio.h",
     ),
     "regular": Choice(
-        "exact, voxel by voxel, without variance", "tracking/regular_transmittance.h", linear=False
+        "exact, voxel by voxel, without variance",
+        "tracking/regular_transmittance.h",
+        linear=False,
+        interpolated=True,
     ),
     "power-series": Choice(
         "power series of exp, its factors from combs of look-ups", "tracking/power_series.h"

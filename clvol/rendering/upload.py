@@ -26,6 +26,7 @@ from clvol.tables.materials import material_table
 from clvol.tables.media import medium_table, phase_table
 from clvol.tables.pixel_filter import filter_cdf
 from clvol.tables.sobol import block_table
+from clvol.tables.transfers import transfer_tables
 
 if TYPE_CHECKING:
     from clvol.device.device import Device
@@ -94,6 +95,8 @@ def _medium_arrays(prepared: PreparedScene, needed: set[str]) -> dict[str, np.nd
             for rows in residuals
         ]
         arrays["residuals"] = _table(parts)
+    if "transfers" in needed:
+        arrays["transfers"], arrays["transfer_points"] = transfer_tables(prepared.matter.media)
     if "blackbody" in needed:
         arrays["blackbody"] = blackbody_table()
     if "phases" in needed:

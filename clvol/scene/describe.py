@@ -203,8 +203,8 @@ def _bsdf(bsdf: Bsdf) -> str:
 def _medium(medium: records.Medium) -> str:
     return (
         f"{'homogeneous' if medium.homogeneous else 'heterogeneous'} medium: "
-        f"sigma_t {_volume(medium.sigma_t)} times {_spectrum(medium.scale)}, "
-        f"albedo {_volume(medium.albedo)}, phase {_phase(medium.phase)}{_emission(medium)}"
+        f"sigma_t {_made(medium, 'sigma_t')} times {_spectrum(medium.scale)}, "
+        f"albedo {_made(medium, 'albedo')}, phase {_phase(medium.phase)}{_emission(medium)}"
     )
 
 
@@ -216,13 +216,19 @@ def _phase(phase: records.PhaseFunction) -> str:
 
 
 def _emission(medium: records.Medium) -> str:
-    factors = [f"emission {_volume(medium.emission)}"] if medium.emission else []
+    factors = [f"emission {_made(medium, 'emission')}"] if medium.emission else []
     if medium.temperature:
         offset, scale = _number(medium.temperature_offset), _number(medium.temperature_scale)
         factors.append(f"a blackbody of ({_volume(medium.temperature)} - {offset}) times {scale} kelvin")
     if not factors:
         return ""
     return f", emits {' times '.join(factors)} times {_spectrum(medium.emission_scale)}"
+
+
+def _made(medium: records.Medium, role: str) -> str:
+    """A coefficient, and what it is made of the values of."""
+    transfer, volume = medium.transfer(role), _volume(getattr(medium, role))
+    return volume if transfer is None else f"by {len(transfer.values)} points from the values of {volume}"
 
 
 def _volume(volume: records.Volume) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from clvol.errors import SceneError, shown
-from clvol.scene import bsdf, emitter, integrator, medium, phase, sensor, shape, texture, volume
+from clvol.scene import bsdf, classified, emitter, integrator, medium, phase, sensor, shape, texture, volume
 from clvol.scene.library import Grids, Library, PluginTable
 from clvol.scene.mesh_files import FORMATS
 from clvol.scene.nodes import Node, from_dict
@@ -60,7 +60,11 @@ PLUGINS: PluginTable = {
         "twosided": bsdf.twosided,
         "mask": bsdf.mask,
     },
-    "medium": {"homogeneous": medium.homogeneous, "heterogeneous": medium.heterogeneous},
+    "medium": {
+        "homogeneous": medium.homogeneous,
+        "heterogeneous": medium.heterogeneous,
+        "classified": classified.classified,
+    },
     "volume": {
         "gridvolume": volume.gridvolume,
         "constvolume": volume.constvolume,

@@ -40,19 +40,17 @@ def _medium(reader: Reader, homogeneous: bool) -> Medium:
             )
     sigma_t, scale = _extinction(reader, homogeneous)
     albedo = _coefficient(reader, "albedo", 0.75, maximum=1.0)
+    emission = _emission(reader)
+    return Medium(sigma_t, albedo, scale, homogeneous=homogeneous, **emission, **common_parameters(reader))
+
+
+def common_parameters(reader: Reader) -> dict[str, Any]:
+    """Fields of a Medium that every kind has from the same parameters: phase, sample_emitters and name."""
     sample_emitters = reader.boolean("sample_emitters", True)
     reader.ignore(has_spectral_extinction=bool)
     phase = reader.only_child("phase")
-    return Medium(
-        sigma_t,
-        albedo,
-        scale,
-        reader.build(phase) if phase else Phase(),
-        homogeneous,
-        sample_emitters,
-        **_emission(reader),
-        name=reader.node.id,
-    )
+    built = reader.build(phase) if phase else Phase()
+    return {"phase": built, "sample_emitters": sample_emitters, "name": reader.node.id}
 
 
 def _extinction(reader: Reader, homogeneous: bool) -> tuple[Volume, Spectrum]:
@@ -99,7 +97,7 @@ def _coefficient(
     """Parameter `name`, a number, a colour or a volume, with values in [0, maximum]."""
     if reader.is_value(name):
         return ConstVolume(reader.color(name, default, light, maximum))
-    volume = _sane(reader, _volume(reader, name, "a number, a colour or a volume"))
+    volume = sane(reader, own_volume(reader, name, "a number, a colour or a volume"))
     if isinstance(volume, GridVolume):
         check_coefficients(volume.grid, f"{name} of medium '{reader.type}'")
     if np.isfinite(maximum) and (largest := largest_value(volume)) > maximum:
@@ -110,7 +108,7 @@ def _coefficient(
     return volume
 
 
-def _sane(reader: Reader, volume: Volume, signed: bool = False) -> Volume:
+def sane(reader: Reader, volume: Volume, signed: bool = False) -> Volume:
     """The volume as it is to be used: with the samples repaired that it asks for.
 
     What media share stays shared.  signed : as in `sanitized`.
@@ -128,7 +126,8 @@ def _sane(reader: Reader, volume: Volume, signed: bool = False) -> Volume:
     return repaired
 
 
-def _volume(reader: Reader, name: str, expected: str) -> Volume:
+def own_volume(reader: Reader, name: str, expected: str) -> Volume:
+    """The volume that is parameter `name`; SceneError, with what is `expected`, for anything else."""
     reader.has(name)
     found = reader.children("volume", name)
     if not found:
@@ -147,14 +146,8 @@ def _emission(reader: Reader) -> dict[str, Any]:
         fields["temperature_scale"] = reader.number("temperature_scale", 1.0)
         fields["temperature_offset"] = reader.number("temperature_offset", 0.0)
     if fields:
-        fields["emission_scale"] = reader.color("emission_scale", 1.0)
         emission = fields.get("emission", ConstVolume((1.0,)))  # a blackbody's luminance is 1
-        brightest = largest_value(emission) * max(fields["emission_scale"])
-        if brightest > BRIGHTEST:
-            name = "emission_scale" if reader.has("emission_scale") else "emission"
-            reader.fail(
-                f"medium '{reader.type}' emits {brightest:g}, and may emit at most {BRIGHTEST:g}", name
-            )
+        fields |= emission_scale(reader, largest_value(emission))
     needs = {"emission_scale": "an emission or a temperature"}
     needs |= dict.fromkeys(("temperature_scale", "temperature_offset"), "a temperature")
     for name, what in needs.items():
@@ -165,12 +158,22 @@ def _emission(reader: Reader) -> dict[str, Any]:
     return fields
 
 
+def emission_scale(reader: Reader, largest: float) -> dict[str, Any]:
+    """`emission_scale` as a field of a Medium, whose unscaled emission is at most `largest`."""
+    factor = reader.color("emission_scale", 1.0)
+    brightest = largest * max(factor)
+    if brightest > BRIGHTEST:
+        name = "emission_scale" if reader.has("emission_scale") else "emission"
+        reader.fail(f"medium '{reader.type}' emits {brightest:g}, and may emit at most {BRIGHTEST:g}", name)
+    return {"emission_scale": factor}
+
+
 def _temperature(reader: Reader) -> Volume:
     """`temperature`, a number or a volume of one channel; any finite values."""
     name, expected = "temperature", "a number or a volume of one channel"
     if reader.is_value(name):
         return ConstVolume((reader.number(name, 0.0),))
-    volume = _sane(reader, _volume(reader, name, expected), signed=True)
+    volume = sane(reader, own_volume(reader, name, expected), signed=True)
     if channels_of(volume) > 1:
         reader.fail(f"'{name}' of medium '{reader.type}' must be {expected}, this one has three", name)
     if isinstance(volume, GridVolume):

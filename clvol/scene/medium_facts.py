@@ -83,6 +83,18 @@ def is_grey(volume: records.Volume) -> bool:
     return channels_of(volume) == 1
 
 
+def is_grey_of(medium: records.Medium, role: str) -> bool:
+    """Whether a medium's "sigma_t", "albedo" or "emission" is grey everywhere, classified or not."""
+    transfer = medium.transfer(role)
+    return is_grey(getattr(medium, role)) if transfer is None else transfer.is_grey
+
+
+def classifies(medium: records.Medium) -> bool:
+    """Whether anything is made of its density's values where the density is interpolated."""
+    sigma_t = medium.sigma_t
+    return medium.transfers is not None and getattr(sigma_t, "filter_type", "") == "trilinear"
+
+
 def is_homogeneous(medium: records.Medium) -> bool:
     """Whether sigma_t is the same everywhere inside (the albedo may still vary)."""
     return isinstance(medium.sigma_t, records.ConstVolume)

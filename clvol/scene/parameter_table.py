@@ -16,6 +16,7 @@ from clvol.scene import parameter_values as values
 from clvol.scene.medium_facts import channels_of
 from clvol.scene.sensor import field_of_view_x
 from clvol.volumes.grid import DenseGrid
+from clvol.volumes.transfer import Transfer
 
 if TYPE_CHECKING:
     from clvol.scene.parameter_values import Check
@@ -136,8 +137,9 @@ def _medium(medium: records.Medium, seen: set[int]) -> Found:
         return
     seen.add(id(medium))
     yield "scale", _colour(medium, "scale", np.inf)
+    yield from _transfers(medium)
     for name, maximum in (("sigma_t", np.inf), ("albedo", 1.0), ("emission", np.inf)):
-        if getattr(medium, name) is not None:
+        if getattr(medium, name) is not None and medium.transfer(name) is None:
             yield from _nested(name, _volume(getattr(medium, name), maximum, signed=False))
     if medium.emission is not None or medium.temperature is not None:
         yield "emission_scale", _colour(medium, "emission_scale", values.BRIGHTEST)
@@ -146,6 +148,25 @@ def _medium(medium: records.Medium, seen: set[int]) -> Found:
         for name in ("temperature_scale", "temperature_offset"):
             yield name, _field(medium, name, values.number())
     yield from _nested("phase_function", _phase(medium, medium.phase, _put_phase))
+
+
+def _transfers(medium: records.Medium) -> Found:
+    """The transfer functions of a classified medium, by the names of its plugin, and the values."""
+    if medium.transfers is None:
+        return
+    for name, role, maximum in (
+        ("opacity", "sigma_t", np.inf),
+        ("albedo", "albedo", 1.0),
+        ("emission", "emission", values.BRIGHTEST),
+    ):
+        if (held := medium.transfer(role)) is not None:
+
+            def put(record: Any, transfer: Any, role: str = role) -> Any:
+                return replace(record, transfers=replace(record.transfers, **{role: transfer}))
+
+            check = values.points(maximum, grey=role == "sigma_t")
+            yield name, Parameter(medium, held, check, put, Transfer.points)
+    yield from _nested("values", _volume(medium.sigma_t, np.inf, signed=True))
 
 
 def _put_phase(medium: Any, phase: Any) -> Any:

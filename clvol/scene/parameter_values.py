@@ -23,6 +23,7 @@ from clvol.scene.transforms import as_matrix, check_size, keeps_angles, scale, t
 from clvol.scene.volume import largest_value
 from clvol.volumes import check_coefficients, check_finite, dense_from_array
 from clvol.volumes.grid import DenseGrid
+from clvol.volumes.transfer import Transfer, transfer_of_points
 
 __all__ = ["BRIGHTEST", "MOST_INTENSE"]
 
@@ -81,6 +82,22 @@ def colour(maximum: float) -> Check:
             raise _wrong(name, f"a number or a colour of three, {range_in_words(0, maximum, False)}", value)
         found = tuple(np.minimum(array, maximum).tolist())
         return found[:1] if len(set(found)) == 1 else found
+
+    return check
+
+
+def points(maximum: float, grey: bool) -> Check:
+    """A transfer function from its points, whose numbers are at most `maximum`; see `transfer_of_points`."""
+
+    def check(value: Any, name: str) -> Transfer:
+        try:
+            transfer = transfer_of_points(value)
+        except ValueError as error:
+            raise SceneError(str(error), name) from None
+        if transfer.largest > maximum or (grey and not transfer.is_grey):
+            each = "one number for each value" if grey else f"numbers of at most {maximum:g}"
+            raise _wrong(name, f"points with {each}", value)
+        return transfer
 
     return check
 

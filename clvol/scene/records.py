@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from clvol.volumes.grid import Grid
+    from clvol.volumes.transfer import Transfer, Transfers
 
 Spectrum = tuple[float, ...]
 """One number (grey) or three (linear sRGB)."""
@@ -161,7 +162,8 @@ class Medium:
 
     It emits sigma_a · L_e per length, where L_e = emission_scale · emission · blackbody(kelvin), without the
     factor that is None (both: no emission at all), and kelvin = (temperature − temperature_offset) ·
-    temperature_scale.  The blackbody is `clvol.tables.blackbody.blackbody_rgb`: of luminance 1, and 0 where
+    temperature_scale.  `transfers` say what is made of the volumes' values, after interpolation, before all
+    that.  The blackbody is `clvol.tables.blackbody.blackbody_rgb`: of luminance 1, and 0 where
     kelvin <= 0.
     """
 
@@ -176,6 +178,7 @@ class Medium:
     emission_scale: Spectrum = (1.0,)
     temperature_scale: float = 1.0
     temperature_offset: float = 0.0
+    transfers: Transfers | None = None
     name: str = ""
 
     def __post_init__(self) -> None:
@@ -192,6 +195,10 @@ class Medium:
         if isinstance(self.temperature, ConstVolume):
             return (self.temperature.value[0] - self.temperature_offset) * self.temperature_scale > 0
         return True
+
+    def transfer(self, role: str) -> Transfer | None:
+        """What is made of the values of the volume that is "sigma_t", "albedo" or "emission", if anything."""
+        return None if self.transfers is None else getattr(self.transfers, role, None)
 
 
 NO_SURFACE = Null()

@@ -13,6 +13,7 @@ from clvol.scene.records import ConstVolume, GridVolume
 from clvol.staging.finding import IN_UNITS, Found, find_grids, plain
 from clvol.staging.source import Field
 from clvol.staging.thickness import WANTED, Rays, glow, thickness
+from clvol.staging.transfer import Look, look_of
 
 if TYPE_CHECKING:
     from types import SimpleNamespace
@@ -63,7 +64,8 @@ class Grids:
             if name is not None
         }
         others = (found.temperature, found.flame, found.colour)
-        grids = cls(found, fields[found.density], *(None if n is None else fields[n] for n in others))
+        density = fields[found.density].seen_as(options.transfer or scanned(fields[found.density]))
+        grids = cls(found, density, *(None if n is None else fields[n] for n in others))
         grids.check(source.name)
         return grids.dark() if options.emission_scale == 0 else grids.lit()
 
@@ -81,6 +83,12 @@ class Grids:
             raise VolumeError(
                 f"grid {colour.name!r} is an albedo, at most 1, and reaches {colour.peak:.4g}", where, hint
             )
+
+    def between(self, limits: tuple[float, float] | None, look: Look | None) -> Grids:
+        """With a look of other limits, those of a sequence."""
+        if self.density.look is None or limits is None or look is None:
+            return self
+        return replace(self, density=self.density.seen_as(look, limits))
 
     def dark(self) -> Grids:
         """Without anything that glows."""
@@ -132,7 +140,9 @@ def choose_scales(grids: Grids, options: SimpleNamespace, rays: Rays, peak: floa
     density = options.density_scale
     if density is None:
         density = 1.0
-        if plain(grids.found.density) not in IN_UNITS and values is not None:
+        look = grids.density.look
+        in_units = plain(grids.found.density) in IN_UNITS if look is None else not look.relative_opacity
+        if not in_units and values is not None:
             thick = thickness(values, rays)
             density = _rounded(min(WANTED / thick, LARGEST)) if 0 < thick < np.inf else 1.0
     kelvin, coldest = _kelvin(grids, options, peak) if peak > 0 else (1.0, 0.0)
@@ -175,12 +185,17 @@ def glowing(grids: Grids) -> Field:
 
 def medium(grids: Grids, options: SimpleNamespace, scales: Scales) -> dict[str, Any]:
     """The plugin."""
+    phase = {"type": "hg", "g": ANISOTROPY if options.anisotropy is None else options.anisotropy}
+    if grids.density.look is not None:
+        made = grids.density.look.plugin(grids.density.plugin, scales.density)
+        scaled = {} if options.emission_scale is None else {"emission_scale": options.emission_scale}
+        return made | {"phase": phase} | (scaled if "emission" in made else {})
     described: dict[str, Any] = {
         "type": "heterogeneous",
         "sigma_t": grids.density.plugin,
         "scale": scales.density,
         "albedo": grids.colour.plugin if grids.colour else _value(options.albedo),
-        "phase": {"type": "hg", "g": ANISOTROPY if options.anisotropy is None else options.anisotropy},
+        "phase": phase,
     }
     if grids.burns:
         described["emission"] = glowing(grids).plugin
@@ -191,6 +206,18 @@ def medium(grids: Grids, options: SimpleNamespace, scales: Scales) -> dict[str, 
         if scales.coldest:
             described["temperature_offset"] = scales.coldest
     return described
+
+
+def scanned(density: Field) -> Look | None:
+    """The look of a CT scan, whose values can be no density: air has about -1000 Hounsfield units."""
+    volume = density.volume
+    if (
+        isinstance(volume, GridVolume)
+        and getattr(volume.grid, "unit", "") == "mm"
+        and density.limits[0] < -500
+    ):
+        return look_of("bone")
+    return None
 
 
 def _value(spectrum: tuple[float, ...]) -> Any:

@@ -14,6 +14,7 @@ from typing import Any
 
 from clvol.errors import OptionError, shown
 from clvol.staging.looks import LOOKS
+from clvol.staging.presets import PRESETS
 
 VIEWS = {
     "front": (0.0, 0.0),
@@ -126,6 +127,13 @@ def light(name: str, value: Any) -> str:
     return str(choice(*LOOKS)(name, value))
 
 
+def look(name: str, value: Any) -> Any:
+    """A transfer function: a preset by name, or what `clvol.transfer` takes."""
+    from clvol.staging.transfer import look_option
+
+    return look_option(name, value)
+
+
 def flag(name: str, value: Any) -> bool:
     """True or false."""
     if not isinstance(value, bool):
@@ -169,6 +177,11 @@ OPTIONS: dict[str, Option] = {
     "colour": Option(text, "GRID", "Grid of the colour, as Cd; none: leave it out.", ("--color",)),
     "level_set": Option(choice("fog"), "fog", "Take the density for a level set, and fill it with fog."),
     "sanitize": Option(flag, "", "Take NaN and slightly negative samples as 0, and count them."),
+    "transfer": Option(
+        look,
+        "NAME",
+        f"Look of scanned or simulated values: {'|'.join(PRESETS)}.",
+    ),
     "density_scale": Option(
         number(0, 1e15, above=True),
         "X",

@@ -42,6 +42,10 @@ def _density(grids: Grids, options: SimpleNamespace, rays: Rays, scale: float) -
     name = _named(grids.density.name)
     if grids.density.empty:
         return f"density  {name}: empty, there is nothing to see"
+    look = grids.density.look
+    if look is not None:
+        shown = f"by the preset {look.name}" if look.name else "by its transfer function"
+        return f"density  values of {name} {shown}, times {scale:.4g}"
     cubic = ", voxels taken as cubes" if grids.density.cubic else ""
     albedo = "" if grids.colour else f"; albedo {', '.join(f'{one:g}' for one in options.albedo)}"
     thick = scale * thickness(rays.sample(grids.density.volume, grids.density.means), rays)

@@ -83,7 +83,14 @@ def _together(found: Sequence[Fixed]) -> Fixed:
         any(one.burns for one in found),
         any(one.flames for one in found),
         max(one.peak for one in found),
+        limits=_joined([one.limits for one in found if one.limits is not None]),
     )
+
+
+def _joined(limits: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
+    if not limits:
+        return None
+    return min(low for low, _ in limits), max(high for _, high in limits)
 
 
 def _scaled(
@@ -97,7 +104,7 @@ def _scaled(
     scales = []
     for name in spread(names, MEASURED):
         options = checked(given)
-        grids = Grids.of(Source.of(name), options)
+        grids = Grids.of(Source.of(name), options).between(fixed.limits, options.transfer)
         settle(options, fixed)
         if fixed.flames and grids.flame is None:
             grids = grids.dark()

@@ -16,8 +16,9 @@ from clvol.scene.loader import load_plugin
 from clvol.scene.records import ConstVolume, GridVolume, Volume
 from clvol.scene.transforms import scale
 from clvol.staging.coarse import Coarse, coarse, extremes
+from clvol.staging.transfer import Look, made_grid, value_range
 from clvol.volumes import Listed, check_finite, list_grids
-from clvol.volumes.grid import DenseGrid
+from clvol.volumes.grid import DenseGrid, Grid
 from clvol.volumes.repair import sanitized
 
 if TYPE_CHECKING:
@@ -73,13 +74,15 @@ class Source:
 class Field:
     """One grid of a volume: the plugin that gives it to a scene, and what and where it is, without NaN.
 
-    `cubic`: its file says nothing of its size, and its voxels are taken as cubes.
+    `cubic`: its file says nothing of its size, and its voxels are taken as cubes.  `look`: what is made of
+    its values; `means` and `peak` are of what is made.
     """
 
     name: str
     plugin: dict[str, Any]
     volume: Volume
     cubic: bool = False
+    look: Look | None = None
 
     @classmethod
     def of(cls, name: str, plugin: dict[str, Any], grids: Grids) -> Field:
@@ -124,14 +127,31 @@ class Field:
     def means(self) -> Coarse:
         """The grid in few cells."""
         assert isinstance(self.volume, GridVolume)
-        return coarse(self.volume.grid)
+        return coarse(self._shown)
+
+    @cached_property
+    def _shown(self) -> Grid:
+        """The grid, or what is made of its samples."""
+        assert isinstance(self.volume, GridVolume)
+        return self.volume.grid if self.look is None else made_grid(self.volume.grid, self.look.opacity)
+
+    def seen_as(self, look: Look | None, limits: tuple[float, float] | None = None) -> Field:
+        """With a look of its values, relative ones between the limits, or else the field's own extremes."""
+        if look is None or isinstance(self.volume, ConstVolume):
+            return self
+        return replace(self, look=look.within(*(limits or self.limits)))
+
+    @cached_property
+    def limits(self) -> tuple[float, float]:
+        """The least and the greatest value, but for a little noise."""
+        return (0.0, 0.0) if isinstance(self.volume, ConstVolume) else value_range(self.volume.grid)
 
     @cached_property
     def peak(self) -> float:
         """The greatest sample."""
         if isinstance(self.volume, ConstVolume):
             return 0.0
-        grid = self.volume.grid
+        grid = self._shown
         stores = [grid.values] if isinstance(grid, DenseGrid) else [grid.leaf_values, grid.tile_values]
         return float(max((store.max() for store in stores if store.size), default=0.0))
 

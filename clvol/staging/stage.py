@@ -52,6 +52,7 @@ class Fixed:
     burns, flames : whether anything glows, and whether flames say what.
     peak : the greatest temperature.
     scales : what the values of the grids are multiplied by; None to choose them.
+    limits : least and greatest value of the density, where something is made of its values.
     """
 
     points: np.ndarray
@@ -60,13 +61,15 @@ class Fixed:
     flames: bool
     peak: float
     scales: Scales | None = None
+    limits: tuple[float, float] | None = None
 
     @classmethod
     def of(cls, source: Source, grids: Grids, options: SimpleNamespace) -> Fixed:
         """Of one volume."""
         up = (options.up, "") if options.up else guess_up(source.path)
         heat = grids.heat.peak if grids.burns and grids.heat is not None else 0.0
-        return cls(shown_points(grids), up, grids.burns, grids.flame is not None, heat)
+        limits = grids.density.limits if grids.density.look else None
+        return cls(shown_points(grids), up, grids.burns, grids.flame is not None, heat, limits=limits)
 
     @property
     def box(self) -> np.ndarray:
@@ -109,6 +112,7 @@ def stage(
     options, size = checked(given), check_size(size)
     grids = Grids.of(source, options, of_sequence=fixed is not None)
     fixed = fixed or Fixed.of(source, grids, options)
+    grids = grids.between(fixed.limits, options.transfer)
     if fixed.flames and grids.flame is None:
         grids = grids.dark()
     settle(options, fixed)
@@ -245,6 +249,7 @@ def volume_scene(
     colour: str | None = None,
     level_set: str | None = None,
     sanitize: bool | None = None,
+    transfer: Any = None,
     density_scale: float | None = None,
     albedo: float | Sequence[float] | None = None,
     anisotropy: float | None = None,
@@ -278,6 +283,9 @@ def volume_scene(
         "fog" takes the density for a level set, and fills it with fog.
     sanitize
         Take NaN and slightly negative samples as 0. A warning counts them.
+    transfer
+        A transfer function of the values: the name of a preset ("bone", "muscle", "lung", "mr", "fire",
+        "density"), or a dict of `clvol.transfer`'s keywords.
     density_scale
         Extinction of density 1. By default the optical thickness is about 8 at the 90th percentile of the
         rays that the camera sends through the volume.

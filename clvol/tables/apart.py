@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from clvol.accel.bounds import classified
 from clvol.scene import records
 from clvol.volumes.bricks import BrickMap
 
@@ -25,7 +26,7 @@ def peak_extinction(medium: records.Medium, density: PreparedVolume | None) -> n
         densest = np.asarray(medium.sigma_t.value, np.float64)
     else:
         assert density is not None
-        densest = density.bricks.peak.astype(np.float64)
+        densest = density.peak(medium.transfer("sigma_t"))
     return np.broadcast_to(densest, 3) * np.broadcast_to(np.asarray(medium.scale, np.float64), 3)
 
 
@@ -41,7 +42,11 @@ def depth_across(matter: Matter, volumes: Sequence[PreparedVolume]) -> float:
     if volume is None or not isinstance(volume.bricks, BrickMap):
         return np.inf
     bricks = volume.bricks
-    mean = 0.75 * bricks.minimum.mean(axis=(0, 1, 2)) + 0.25 * bricks.maximum.mean(axis=(0, 1, 2))
+    transfer = matter.media[0].transfer("sigma_t")
+    low, high = bricks.minimum, bricks.maximum
+    if transfer is not None:
+        low, high = classified(low, high, transfer)
+    mean = 0.75 * low.mean(axis=(0, 1, 2)) + 0.25 * high.mean(axis=(0, 1, 2))
     edges = volume.voxel * bricks.size
     return float(np.max(mean * np.array(matter.media[0].scale)) * edges.mean())
 

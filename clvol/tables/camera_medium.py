@@ -50,7 +50,12 @@ def _endless(medium: records.Medium) -> bool:
         return False
     if isinstance(medium.sigma_t, records.ConstVolume):
         return any(medium.sigma_t.value)
-    return isinstance(medium.sigma_t.grid, SparseGrid) and not medium.sigma_t.grid.clear_outside
+    if not isinstance(medium.sigma_t.grid, SparseGrid):
+        return False
+    transfer = medium.transfer("sigma_t")
+    if transfer is not None:
+        return bool(transfer(np.array(medium.sigma_t.grid.background)).max() > 0)
+    return not medium.sigma_t.grid.clear_outside
 
 
 def _check_far_light(scene: records.Scene, medium: records.Medium) -> None:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from clvol.scene import records
     from clvol.scene.medium_facts import Matter
     from clvol.tables.volumes import PreparedVolume
+    from clvol.volumes.transfer import Transfer
 
 KINDS = ("global", "grid", "kdtree")
 
@@ -108,7 +109,11 @@ def choose_majorants(matter: Matter, volumes: Sequence[PreparedVolume], needs: M
         return Majorants("none", (), tuple(tables))
     for one in walked:
         _check_range(one, needs)
-    bounds = {number: _bounds(volumes[number], needs) for number in {_density(matter, w) for w in walked}}
+    bounds: dict[tuple[int, Transfer | None], AnyBounds] = {}
+    for one in walked:
+        key = _density(matter, one)
+        if key not in bounds:
+            bounds[key] = _bounds(one.volume, needs, key[1])
     found = {
         kind: [_candidate(one, bounds[_density(matter, one)], kind, needs) for one in walked]
         for kind in (KINDS if needs.majorant == "auto" else (needs.majorant,))
@@ -127,9 +132,9 @@ def choose_majorants(matter: Matter, volumes: Sequence[PreparedVolume], needs: M
     return Majorants(chosen, tuple(costs.items()) if needs.majorant == "auto" else (), tuple(tables))
 
 
-def _density(matter: Matter, one: _Walked) -> int:
-    """Number of the volume that is a medium's sigma_t."""
-    return matter.roles[one.number]["sigma_t"]
+def _density(matter: Matter, one: _Walked) -> tuple[int, Transfer | None]:
+    """Number of the volume that is a medium's sigma_t, and what is made of its values."""
+    return matter.roles[one.number]["sigma_t"], one.medium.transfer("sigma_t")
 
 
 def _longest(one: _Walked) -> np.ndarray:
@@ -143,7 +148,7 @@ def _longest(one: _Walked) -> np.ndarray:
 
 def _check_range(one: _Walked, needs: MajorantNeeds) -> None:
     scale = float(np.max(one.medium.scale))
-    largest = float(one.volume.bricks.peak.max())
+    largest = float(one.volume.peak(one.medium.transfer("sigma_t")).max())
     if largest * max(scale, 1.0) * max(needs.scale, 1.0) > float(np.finfo(np.float32).max):
         factor = "" if needs.scale == 1 else f" and majorant_scale {needs.scale:g}"
         raise SceneError(
@@ -152,12 +157,13 @@ def _check_range(one: _Walked, needs: MajorantNeeds) -> None:
         )
 
 
-def _bounds(volume: PreparedVolume, needs: MajorantNeeds) -> AnyBounds:
+def _bounds(volume: PreparedVolume, needs: MajorantNeeds, transfer: Transfer | None) -> AnyBounds:
     """Bounds over the finest cells there are, with means where they are wanted."""
     bricks = volume.bricks
     if isinstance(bricks, BrickTree):
-        return sparse_bounds(bricks, needs.means)
-    return with_slack(bricks.minimum, bricks.maximum, BOUND_CELLS, bricks.means() if needs.means else None)
+        return sparse_bounds(bricks, needs.means, transfer)
+    means = bricks.means(transfer) if needs.means else None
+    return with_slack(bricks.minimum, bricks.maximum, BOUND_CELLS, means, transfer)
 
 
 def _as_sparse(bounds: AnyBounds) -> SparseBounds:

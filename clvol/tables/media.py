@@ -52,6 +52,7 @@ def medium_table(prepared: PreparedScene) -> np.ndarray:
         depth = most_depth(peak_extinction(medium, volume), box)
         caught = -np.expm1(-depth)  # a sun is seen in what scatters it alone
         record["background"] = (sky + suns * caught) * expected_albedo(medium) * alone
+        record["transfer"] = -1 if medium.transfers is None else len(layout.ENUMS["TRANSFER"]) * number
         record["sigma_t_volume"] = roles.get("sigma_t", -1)
         record["albedo_volume"] = roles.get("albedo", -1)
         if isinstance(medium.albedo, records.ConstVolume):
@@ -72,7 +73,7 @@ def medium_table(prepared: PreparedScene) -> np.ndarray:
         record["box_upper"] = (to_brick @ [*sigma_t.upper, 1.0])[:3]
         record["march_step"] = prepared.plan.choices.step or volume.voxel.min()
         record["majorant"] = majorant.majorant.max()
-        record["bound"] = max(record["majorant"], volume.bricks.peak.max())
+        record["bound"] = max(record["majorant"], volume.peak(medium.transfer("sigma_t")).max())
         record["cells"], record["cell_size"] = majorant.cells, majorant.cell_size
         record["cell_offset"], record["kd_root"] = cell_offset, kd_root
         record["links_first"], record["links_levels"] = links_first, majorant.levels

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from clvol.accel.bounds import classified
 from clvol.errors import SceneError
 from clvol.scene import records
 from clvol.scene.boundaries import is_clipped
@@ -13,6 +15,9 @@ from clvol.scene.medium_facts import volume_roles
 from clvol.tables.affine import from_centred
 from clvol.volumes.bricks import BrickMap, BrickTree, build_bricks
 from clvol.volumes.grid import DenseGrid
+
+if TYPE_CHECKING:
+    from clvol.volumes.transfer import Transfer
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +27,17 @@ class PreparedVolume:
     volume: records.GridVolume
     bricks: BrickMap | BrickTree
     world_to_index: np.ndarray
+
+    def peak(self, transfer: Transfer | None) -> np.ndarray:
+        """The largest value of each channel, or of what is made of the values; float64 (channels,)."""
+        if transfer is None:
+            return self.bricks.peak.astype(np.float64)
+        lowest, highest = self.bricks.minimum.min(initial=np.inf), self.bricks.maximum.max(initial=-np.inf)
+        constants = self.bricks.constants
+        lowest = min(float(lowest), float(constants.min(initial=np.inf)))
+        highest = max(float(highest), float(constants.max(initial=-np.inf)))
+        _, peak = classified(np.array([lowest], np.float32), np.array([highest], np.float32), transfer)
+        return peak.astype(np.float64)
 
     @property
     def edges(self) -> np.ndarray:

@@ -21,6 +21,7 @@ from clvol.volumes.brick_samples import (
     sparse_lattice,
 )
 from clvol.volumes.files import place
+from clvol.volumes.transfer import made_of
 from clvol.volumes.tree import (
     NODE_ENTRIES,
     Tier,
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 
     from clvol.volumes.grid import SparseGrid
     from clvol.volumes.sparse_places import SparsePlaces
+    from clvol.volumes.transfer import Transfer
 
 COMPACT_BRICKS = 1 << 17
 """A box of no more brick places than this (a dense top grid of 512 KiB) has a dense top grid in any case."""
@@ -113,13 +115,16 @@ class BrickTree:
             yield first, samples
             first += len(samples)
 
-    def means(self) -> np.ndarray:
-        """Means of the interpolant over the halves of the kept bricks: float32 (n, 2, 2, 2, channels)."""
-        means = self.minimum.copy()
+    def means(self, transfer: Transfer | None = None) -> np.ndarray:
+        """Means of the interpolant over the halves of the kept bricks: float32 (n, 2, 2, 2, channels).
+
+        transfer : of what it makes of the values, about: of the samples, interpolated.
+        """
+        means = made_of(self.minimum, transfer).copy()
         rows = np.flatnonzero(self.numbers < self.brick_count - len(self.constants))
         for first, samples in self._varying():
-            means[rows[first : first + len(samples)]] = half_means(samples)
-        return means.clip(self.minimum, self.maximum)
+            means[rows[first : first + len(samples)]] = half_means(made_of(samples, transfer))
+        return means.clip(self.minimum, self.maximum) if transfer is None else means
 
 
 def is_scattered(shape: tuple[int, int, int], places: int) -> bool:

@@ -30,9 +30,12 @@ from clvol.volumes.brick_tree import BrickTree, build_tree, check_extent, is_sca
 from clvol.volumes.files import place
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
 from clvol.volumes.sparse_places import SparsePlaces
+from clvol.volumes.transfer import made_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from clvol.volumes.transfer import Transfer
 
 __all__ = ["BOUND_CELLS", "BrickMap", "BrickTree", "build_bricks"]
 
@@ -94,20 +97,23 @@ class BrickMap:
             yield first, samples
             first += len(samples)
 
-    def means(self) -> np.ndarray:
+    def means(self, transfer: Transfer | None = None) -> np.ndarray:
         """Mean of the trilinear interpolant over each cube of 4³ cells: float32 (2bz, 2by, 2bx, channels).
 
         Exact, by the trapezoid rule along each axis.  Reads the grid once more, in bounded memory.
+
+        transfer : of what it makes of the values, about: of the samples, interpolated.
         """
         varying = self.brick_count - len(self.constants)
         varies = self.top < varying
         values = np.empty((*self.top.shape, self.channels), np.float32)
-        values[~varies] = self.constants[self.top[~varies] - varying]
+        values[~varies] = made_of(self.constants, transfer)[self.top[~varies] - varying]
         means = np.repeat(np.repeat(np.repeat(values, 2, 0), 2, 1), 2, 2)
         places = np.argwhere(varies)
         for first, samples in self._varying():
-            _put_halves(means, places[first : first + len(samples)], half_means(samples))
-        return means.clip(self.minimum, self.maximum)
+            halves = half_means(made_of(samples, transfer))
+            _put_halves(means, places[first : first + len(samples)], halves)
+        return means.clip(self.minimum, self.maximum) if transfer is None else means
 
 
 def build_bricks(grid: Grid) -> BrickMap | BrickTree:

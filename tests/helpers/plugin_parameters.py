@@ -164,6 +164,20 @@ PARAMETERS = {
     "mask": ({"inner": {"type": "diffuse"}}, {"inner": {"type": "plastic"}, "opacity": TEXTURE}),
     "homogeneous": ({"emission": 1.0, "temperature": 900.0}, MEDIUM),
     "heterogeneous": ({"emission": 1.0, "temperature": 900.0}, MEDIUM | {"sigma_t": VOLUME}),
+    "classified": (
+        {"values": VOLUME, "opacity": "0: 0, 1: 2", "emission": 1.0},
+        {
+            "values": {"type": "gridvolume", "filename": "b.vol"},
+            "opacity": "0: 0, 0.5: 3",
+            "albedo": "0: 0.2, 1: 0.4",
+            "scale": 2.0,
+            "emission": "0: 0, 1: 3",
+            "emission_scale": 2.0,
+            "sample_emitters": False,
+            "has_spectral_extinction": Silent(True),
+            "phase": {"type": "rayleigh"},
+        },
+    ),
     "gridvolume": (
         {"filename": "a.vol"},
         {

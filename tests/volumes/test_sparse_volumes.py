@@ -29,6 +29,7 @@ from clvol.scene.records import Medium
 from clvol.tables.prepare import prepare
 from clvol.volumes.brick_tree import MOST_EXTENT, BrickTree, is_scattered
 from clvol.volumes.bricks import BOUND_CELLS, BrickMap, build_bricks
+from clvol.volumes.transfer import transfer_of_points
 from clvol.volumes.tree import build_tiers, device_nodes, keys, rows_of
 
 
@@ -128,11 +129,15 @@ def spread(bounds):
     return arrays
 
 
-@pytest.mark.parametrize("name", GRIDS)
-def test_bounds_without_arrays_over_the_box_are_those_with_them(monkeypatch, name):
+BOUNDED = [*((name, None) for name in GRIDS), ("lumps", [(0, 0.25), (0.3, 0), (0.5, 4), (0.7, 0)])]
+
+
+@pytest.mark.parametrize(("name", "points"), BOUNDED)
+def test_bounds_without_arrays_over_the_box_are_those_with_them(monkeypatch, name, points):
     dense, tree = both(GRIDS[name], monkeypatch)
-    exact = with_slack(dense.minimum, dense.maximum, BOUND_CELLS, dense.means())
-    bounds = sparse_bounds(tree, True)
+    transfer = points and transfer_of_points(points)
+    exact = with_slack(dense.minimum, dense.maximum, BOUND_CELLS, dense.means(transfer), transfer)
+    bounds = sparse_bounds(tree, True, transfer)
     for _ in range(10):
         assert (bounds.cells, bounds.cell_size) == (exact.cells, exact.cell_size)
         low, high, mean = spread(bounds)
