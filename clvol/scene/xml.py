@@ -70,7 +70,7 @@ def read_xml(path: Path, keywords: Mapping[str, object]) -> Node:
             raise SceneError(f"'{path}' is {kind}, not a scene file", hint=hint)
         raise SceneError(f"scene file '{path}' does not exist")
     if is_volume(path):
-        hint = "`clvol info` shows it; a scene's medium can name it"
+        hint = "`clvol scene` makes a scene of it, `clvol render` a picture"
         raise SceneError(f"'{path}' is a volume, not a scene", hint=hint)
     reader = _XmlReader(keywords)
     return _finished(reader, reader.file(path, [], ""), keywords, str(path))

@@ -330,5 +330,6 @@ def test_ctrl_c_leaves_a_shorter_film(tmp_path: Path) -> None:
             film.add(np.zeros((4, 4, 3), np.uint8))
             raise KeyboardInterrupt
 
-    pytest.raises(KeyboardInterrupt, pressed)
+    with pytest.raises(KeyboardInterrupt):
+        pressed()
     assert len(list(ffmpeg.read_frames(str(path)))) == 2  # what it is, and its frame
