@@ -43,8 +43,8 @@ if TYPE_CHECKING:
         traverse,
     )
     from clvol.scene.records import Scene
-    from clvol.staging.stage import volume_scene
     from clvol.staging.transfer import transfer
+    from clvol.staging.volume import volume_scene
     from clvol.volumes.loading import load_volume
 
 __all__ = [
@@ -110,7 +110,7 @@ _MODULES = {
         "traverse",
     ],
     "clvol.scene.records": ["Scene"],
-    "clvol.staging.stage": ["volume_scene"],
+    "clvol.staging.volume": ["volume_scene"],
     "clvol.staging.transfer": ["transfer"],
     "clvol.volumes.loading": ["load_volume"],
 }
