@@ -60,6 +60,7 @@ class ViewCommand(ExplainedCommand):
     "--spp", type=click.IntRange(min=1), default=SPP, help=f"Samples after which it rests; {SPP} by default."
 )
 @click.option("--exposure", type=Stops(), default=0.0, metavar="STOPS|auto", help="Brighten what is shown.")
+@click.option("--denoise", is_flag=True, help="Show the picture without its noise.")
 @click.option("--seed", type=click.IntRange(min=0), help="Same seed, same bits; the scene's own by default.")
 @device_option
 @definitions_option
@@ -96,7 +97,8 @@ def view(
     from clvol.viewer.subject import Subject
     from clvol.viewer.wish import Wish
 
-    first = Wish.of({name: options.pop(name) for name in ("technique", "transmittance", "exposure")})
+    wished = ("technique", "transmittance", "denoise", "exposure")
+    first = Wish.of({name: options.pop(name) for name in wished})
     words = _words(scene, definitions, options)
     asked = Asked.taken(scene, options, definitions)
     sensor = options.pop("sensor")

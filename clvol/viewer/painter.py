@@ -127,8 +127,8 @@ class Painter:
         with self._news:
             if self._outdated(wish):
                 return
-            names = {"technique": wish.technique, "transmittance": wish.transmittance}
-            options = {**self.options, **names, "sensor": self.subject.sensor, "size": size, "spp": spp}
+            chosen = {name: getattr(wish, name) for name in ("technique", "transmittance", "denoise")}
+            options = {**self.options, **chosen, "sensor": self.subject.sensor, "size": size, "spp": spp}
             self._frames = frames = progressive(self.subject.scene, **options)
         try:
             for frame in frames:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from clvol.base.extras import need
 from clvol.errors import Error, OptionError
+from clvol.picture.denoising import need_denoiser
 from clvol.planning import registry
 from clvol.viewer.painter import Painter
 from clvol.viewer.wish import Wish
@@ -196,9 +197,10 @@ class Server:
             for family in ("technique", "transmittance")
         }
         name = self.subject.scene.source or "scene"
-        first = {name: getattr(self.first, name) for name in (*families, "exposure")}
+        first = {name: getattr(self.first, name) for name in (*families, "denoise", "exposure")}
         return {
             "kind": "scene",
+            "denoiser": _has_denoiser(),
             "name": name,
             "families": families,
             "first": first,
@@ -256,6 +258,14 @@ class Server:
 def _finite(number: float) -> float | None:
     number = float(number)
     return number if abs(number) < float("inf") else None
+
+
+def _has_denoiser() -> bool:
+    try:
+        need_denoiser()
+    except OptionError:
+        return False
+    return True
 
 
 def _message(said: dict[str, Any], picture: bytes = b"") -> bytes:

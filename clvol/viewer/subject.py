@@ -127,6 +127,7 @@ class Subject:
         assert self.size is not None
         words = [*self.words, "-o", "view.png", "--size", "x".join(map(str, self.size)), "--spp", str(spp)]
         words += [] if wish.exposure == 0 else ["--exposure", _plain(wish.exposure)]
+        words += ["--denoise"] if wish.denoise else []
         for family in ("technique", "transmittance"):
             name = getattr(wish, family)
             words += [] if name == "auto" else [f"--{family}", name]

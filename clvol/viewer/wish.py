@@ -37,6 +37,7 @@ class Wish:
     azimuth, elevation : degrees of where the sun stands.
     turn : degrees by which the environment is turned.
     technique, transmittance : names from the registry.
+    denoise : show it without its noise.
     exposure : stops, or "auto".
     """
 
@@ -49,6 +50,7 @@ class Wish:
     turn: float = 0.0
     technique: str = "auto"
     transmittance: str = "auto"
+    denoise: bool = False
     exposure: float | str = 0.0
 
     @classmethod
@@ -64,7 +66,7 @@ class Wish:
     @property
     def rendered(self) -> tuple[Any, ...]:
         """What another render is needed for, when it changes."""
-        return *self.seen, self.technique, self.transmittance
+        return *self.seen, self.technique, self.transmittance, self.denoise
 
     @property
     def seen(self) -> tuple[Any, ...]:
@@ -79,6 +81,10 @@ def _checked(name: str, value: Any) -> Any:
         if not isinstance(value, list) or len(value) != _VIEW:
             raise OptionError(f"a camera has {_VIEW} numbers", hint="origin, target, up")
         return tuple(_number(name, one, -_LARGEST, _LARGEST) for one in value)
+    if name == "denoise":
+        if not isinstance(value, bool):
+            raise OptionError(f"denoise must be true or false, not {shown(value)}")
+        return value
     if name == "exposure" and value == "auto":
         return value
     return _number(name, value, *_LIMITS[name])

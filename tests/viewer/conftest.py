@@ -10,8 +10,11 @@ from viewing import serving
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-for module in ("starlette", "uvicorn", "websockets"):
-    pytest.importorskip(module, reason=f"the viewer needs {module}, of the extra view")
+
+@pytest.fixture(scope="session", autouse=True)
+def extra() -> None:
+    for module in ("starlette", "uvicorn", "websockets"):
+        pytest.importorskip(module, reason=f"the viewer needs {module}, of the extra view")
 
 
 @pytest.fixture(scope="module")

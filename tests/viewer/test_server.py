@@ -28,12 +28,23 @@ from clvol.viewer.wish import Wish
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from viewing import Page
+
 
 def status(server: Any, path: str) -> int:
     place = urlsplit(server.address)
     connection = HTTPConnection(place.hostname or "", place.port, timeout=30)
     connection.request("GET", path)
     return connection.getresponse().status
+
+
+def shown(server: Any, page: Page, wish: dict[str, Any]) -> dict[str, Any]:
+    """Wish for it, and wait for its last picture."""
+    page.send(wish)
+    expected = Wish.of(wish)
+    return page.take(
+        "picture", lambda said: said["is_last"] and said["command"] == server.subject.command(expected, 4)
+    )
 
 
 def test_all_requests_need_the_token(server: Any) -> None:
@@ -71,8 +82,8 @@ def test_a_wish_changes_the_picture_and_its_command_renders_the_same_bits(
         before = page.last()
         eye, target, up = (page.scene["camera"][n : n + 3] for n in (0, 3, 6))
         camera = [*(x + 0.2 for x in eye), *target, *up]
-        page.send({"camera": camera, "density": 2.5, "technique": "delta", "exposure": 1})
-        after = page.take("picture", lambda said: said["is_last"] and said["seen"] != before["seen"])
+        wish = {"camera": camera, "density": 2.5, "technique": "delta", "exposure": 1}
+        after = shown(server, page, wish)
     assert after["data"] != before["data"]
     assert (
         "--technique delta" in after["command"]
@@ -102,24 +113,32 @@ def pixels(data: bytes) -> np.ndarray:
 
 def test_nothing_turned_is_the_scene_as_it_is(server: Any) -> None:
     with page_of(server) as page:
-        page.send({})
-        said = page.take("picture", lambda said: said["is_last"] and "--set" not in said["command"])
+        said = shown(server, page, {})
     assert said["command"].endswith("-o view.png --size 16x16 --spp 4")
 
 
 def test_exposure_shows_the_same_samples_again(server: Any) -> None:
     with page_of(server) as page:
-        page.send({"density": 1.5})
-        dark = page.take("picture", lambda said: said["is_last"] and "scale" in said["command"])
+        dark = shown(server, page, {"density": 1.5})
         rendered = server.painter.latest.result
-        page.send({"density": 1.5, "exposure": 3})
-        bright = page.take("picture", lambda said: "--exposure 3" in said["command"])
+        bright = shown(server, page, {"density": 1.5, "exposure": 3})
         assert server.painter.latest.result is rendered
     assert pixels(bright["data"]).mean() > pixels(dark["data"]).mean()
     assert bright["spp"] == 4 and bright["is_last"]
 
 
+def test_denoising_shows_another_picture_of_the_same_samples(server: Any, tmp_path: Path) -> None:
+    pytest.importorskip("pyoidn", reason="denoising needs pyoidn, of the extra denoise")
+    with page_of(server) as page:
+        noisy = shown(server, page, {"density": 1.25})
+        image = server.painter.latest.result.image
+        clean = shown(server, page, {"density": 1.25, "denoise": True})
+        assert np.array_equal(server.painter.latest.result.image, image)
+    assert clean["data"] != noisy["data"] and clean["noise"] == noisy["noise"]
+
+
 HOSTILE = [
+    '{"denoise": 1}',
     b"\x00\xff",
     "",
     "{",
@@ -153,8 +172,7 @@ def test_what_is_no_wish_is_an_error_and_no_end(server: Any) -> None:
         for text in HOSTILE:
             page.send(text)
             assert page.take("error")["text"], text
-        page.send({"density": 0.5})
-        assert page.take("picture", lambda said: said["is_last"] and "scale" in said["command"])
+        assert shown(server, page, {"density": 0.5})
 
 
 def test_an_endless_message_ends_its_own_page_alone(server: Any) -> None:
@@ -165,8 +183,7 @@ def test_an_endless_message_ends_its_own_page_alone(server: Any) -> None:
         with pytest.raises(ConnectionClosed):
             page.take("nothing")
     with page_of(server) as page:
-        page.send({})
-        assert page.last()
+        assert shown(server, page, {})
 
 
 def test_a_new_wish_ends_the_render_of_the_old_one() -> None:
@@ -188,8 +205,7 @@ def test_a_new_wish_ends_the_render_of_the_old_one() -> None:
 
 def test_who_comes_later_sees_the_picture_there_is(server: Any) -> None:
     with page_of(server) as page:
-        page.send({"density": 0.75})
-        page.take("picture", lambda said: said["is_last"] and "scale" in said["command"])
+        shown(server, page, {"density": 0.75})
         with page_of(server) as other:
             assert other.last()["data"]
 

@@ -16,7 +16,7 @@ function turned(v, axis, angle) {  // Rodrigues
 
 let scene = null, camera = null, socket = null, due = false;
 const wish = {camera: null, density: 1, glow: 1, anisotropy: null, azimuth: null, elevation: null, turn: 0,
-              technique: "auto", transmittance: "auto", exposure: 0};
+              technique: "auto", transmittance: "auto", denoise: false, exposure: 0};
 const KNOBS = {  // what a slider's place means, and how it is written
   exposure: [(x) => x, (x) => `${x > 0 ? "+" : ""}${x.toFixed(1)} stops`],
   density: [(x) => 2 ** x, (x) => `× ${(2 ** x).toPrecision(3)}`],
@@ -141,6 +141,7 @@ at("automatic").addEventListener("change", (event) => {
   wish.exposure = event.target.checked ? "auto" : Number(document.querySelector("[data-knob=exposure]").value);
   send();
 });
+at("denoise").addEventListener("change", (event) => { wish.denoise = event.target.checked; send(); });
 at("views").addEventListener("click", (event) => {
   const {azimuth, elevation} = event.target.dataset;
   if (azimuth !== undefined && camera) stand(Number(azimuth), Number(elevation));
@@ -233,6 +234,8 @@ function meet(said) {
     slider.value = place;
     write(slider);
   }
+  at("denoise").disabled = !said.denoiser;
+  at("nodenoise").hidden = said.denoiser;
   for (const family of ["technique", "transmittance"]) {
     at(family).replaceChildren(...["auto", ...Object.keys(said.families[family])].map((name) => {
       const option = document.createElement("option");
@@ -249,6 +252,7 @@ function meet(said) {
 function begin(first) {  // as the command line has it
   Object.assign(wish, first);
   at("automatic").checked = first.exposure === "auto";
+  at("denoise").checked = first.denoise;
   const slider = document.querySelector("[data-knob=exposure]");
   slider.value = first.exposure === "auto" ? 0 : first.exposure;
   write(slider);
