@@ -148,6 +148,19 @@ ProgressCallback = Callable[[Progress], None]
 """What ``clvol.render(progress=...)`` accepts besides True and False."""
 
 
+class Several:
+    """Callbacks as one; what they read of a picture is read once."""
+
+    def __init__(self, *callbacks: ProgressCallback) -> None:
+        self.callbacks = callbacks
+        self.self_paced = all(getattr(callback, "self_paced", False) for callback in callbacks)
+
+    def __call__(self, record: Progress) -> None:
+        """Hand the record on."""
+        for callback in self.callbacks:
+            callback(record)
+
+
 class PacedNoise:
     """The noise of the picture so far, at a small share of the render's time: what a bar shows.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from clvol.base.output_files import StrPath
     from clvol.picture.profile import Profile
     from clvol.picture.result import Result
+    from clvol.picture.tev import Tev
     from clvol.scene.records import Scene
 
 EXAMPLES = """
@@ -51,6 +52,7 @@ Examples:
   clvol render scenes/cloud.xml -o cloud.exr -o cloud.png --spp 256
   clvol render scenes/cloud.xml -o cloud.exr --time 20 -v
   clvol render scenes/cloud.xml -o cloud.exr -D res=512 --majorant global
+  clvol render scenes/cloud.xml -o cloud.exr --tev
   clvol render scenes/cloud.xml -o near.png --set sensor.x_fov=20 --set shape.interior.scale=80
   clvol render scenes/cloud.xml -o cloud.exr --technique decomposition --transmittance residual-ratio
   clvol render scenes/smoke.xml -o smoke.exr --technique auto:pilot
@@ -152,6 +154,14 @@ class RenderCommand(ExplainedCommand):
     help="Write when each kernel ran, as a .json that Perfetto and chrome://tracing show.",
 )
 @frame_options
+@click.option(
+    "--tev",
+    "tev",
+    is_flag=False,
+    flag_value="localhost",
+    metavar="[HOST:PORT]",
+    help="Show the picture in the viewer tev as it refines; on this machine by default.",
+)
 @quiet_option
 def render(
     scene: str,
@@ -159,6 +169,7 @@ def render(
     definitions: tuple[tuple[str, str], ...],
     verbose: bool,
     trace: str | None,
+    tev: str | None,
     quiet: bool,
     **options: Any,
 ) -> None:
@@ -181,8 +192,8 @@ def render(
     console, profiled = error_console(), options.pop("profile")
     options |= extent | {"profile": profiled or trace is not None}
     options["resume"] = _picture_to_go_on_from(outputs, frames is not None) if options["resume"] else None
-    painter = Painter(asked, options, shown, trace, quiet, console)
-    with logging_to(console, verbose):
+    with logging_to(console, verbose), _tev_at(tev) as viewer:
+        painter = Painter(asked, options, shown, trace, quiet, console, viewer)
         if frames is not None:
             check_series(options, shown, trace, frames)
             series = Series(
@@ -202,11 +213,12 @@ class Painter:
     trace: str | None
     quiet: bool
     console: Console
+    tev: Tev | None = None
 
     def result(self, scene: Scene, outputs: Sequence[str]) -> Result:
         """Render a scene that fits the outputs."""
         import clvol
-        from clvol.base.progress import RichProgress
+        from clvol.base.progress import RichProgress, Several
 
         _check_room(scene, outputs, self.options)
         piloted = self.options["technique"] == "auto:pilot"
@@ -214,8 +226,13 @@ class Painter:
             from clvol.lab.repeat import announcement
 
             mention([announcement(scene, self.options)], err=True)
-        with nullcontext(False) if self.quiet else RichProgress(self.console) as progress:
-            result: Result = clvol.render(scene, progress=progress, **self.options)
+        if self.tev:
+            self.tev.begin(outputs[0] if outputs else "clvol")
+        with nullcontext() if self.quiet else RichProgress(self.console) as bar:
+            watching = Several(*(one for one in (bar, self.tev) if one is not None))
+            result: Result = clvol.render(scene, progress=watching, **self.options)
+        if self.tev:
+            self.tev.finish(result)
         if piloted:
             from clvol.lab.repeat import with_definitions
 
@@ -257,6 +274,15 @@ class Painter:
         for failure in failures.values():
             raise failure
         exit_by(result.stats["interrupted"])
+
+
+def _tev_at(address: str | None) -> AbstractContextManager[Tev | None]:
+    """The viewer that --tev names, to be left at the end."""
+    if address is None:
+        return nullcontext()
+    from clvol.picture.tev import Tev
+
+    return Tev(address)
 
 
 def _picture_to_go_on_from(outputs: Sequence[str], series: bool) -> str | None:
