@@ -10,7 +10,7 @@ from pathlib import Path
 from clvol.errors import OptionError, shown
 
 _PLACE = re.compile(r"#+|%(?:0(\d{1,2}))?d")
-MOST = 1_000_000
+MOST = 100_000
 """Frames that a list may name."""
 
 

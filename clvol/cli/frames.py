@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from clvol.base.frames import Pattern, parse_frames
+from clvol.base.frames import MOST, Pattern, parse_frames
 from clvol.cli.messages import exit_by, mention
 from clvol.errors import DeviceError, Error
 
@@ -266,7 +266,10 @@ def frame_options(command: Any) -> Any:
         positive_option("--fps", default=24.0, metavar="N", help="Frames of a film a second; 24 by default."),
         click.option("--overwrite", is_flag=True, help="Render frames again that are there already."),
         click.option(
-            "--turntable", type=click.IntRange(min=1), metavar="N", help="Turn the volume once, in N frames."
+            "--turntable",
+            type=click.IntRange(1, MOST),
+            metavar="N",
+            help="Turn the volume once, in N frames.",
         ),
         click.option(
             "--frames",
