@@ -7,8 +7,10 @@ techniques by `clvol.compare`, the pilot's by tools/pilot.py and the performance
 from __future__ import annotations
 
 import json
+import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -28,6 +30,7 @@ from documents import between, writable, write
 from pilot import SCENES, pilot_options, tested
 from recipes import RECIPES
 
+from clvol import load_result
 from clvol.cli.messages import OneLineErrors
 
 if TYPE_CHECKING:
@@ -46,29 +49,68 @@ TRANSITIONS = "<!-- transitions: written by tools/docs.py -->", "<!-- end of tra
 
 
 def commands() -> dict[str, list[str]]:
-    """The commands of docs/ that make its pictures, by the picture's name."""
+    """The commands of docs/ that make its pictures and films, by their names."""
     text = "\n".join((DOCS / page).read_text(encoding="utf-8") for page in PICTURED)
     found = {}
     for line in re.findall(r"clvol (?:render|ray) scenes/[^`\n]+", text):
         words = shlex.split(line)
         for output in (words[n + 1] for n, word in enumerate(words[:-1]) if word == "-o"):
-            name = Path(output).stem
-            if f"(pictures/{name}.png)" in text:
-                found[name] = words
+            if re.search(rf"pictures/{re.escape(Path(output).name)}[)\"]", text):
+                found[Path(output).stem] = words
     return found
 
 
-def run(words: list[str], name: str) -> None:
-    """One of these commands, with docs/pictures/NAME.png as its output."""
-    kept, rest = [], iter(words[1:])
+def without(words: list[str], *options: str) -> list[str]:
+    """A command without these options, each of which takes a value."""
+    kept, rest = [], iter(words)
     for word in rest:
-        if word == "-o":
+        if word in options:
             next(rest)
         else:
             kept.append(word)
-    command = [sys.executable, "-m", "clvol.cli.main", *kept, "-o", f"docs/pictures/{name}.png"]
-    if subprocess.run(command, cwd=ROOT).returncode:
+    return kept
+
+
+def run(words: list[str], name: str) -> None:
+    """One of these commands, with its output in docs/pictures.
+
+    A picture that is denoised is there twice: NAME-denoised.png is what the command writes, NAME.png what it
+    writes without --denoise; the samples are the same.
+    """
+    output = Path("docs/pictures") / Path(words[words.index("-o") + 1]).name
+    if "--denoise" not in words or output.suffix != ".png":
+        call([*without(words[1:], "-o"), "-o", str(output)])
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        whole = Path(folder) / "picture.exr"
+        call([*without(words[1:], "-o", "--exposure"), "-o", str(whole)])
+        result = load_result(whole)
+    stops = words[words.index("--exposure") + 1] if "--exposure" in words else "0"
+    exposure = stops if stops == "auto" else float(stops)
+    result.save(ROOT / output.with_stem(f"{name}-denoised"), exposure)
+    result.denoised = None
+    result.metadata.pop("denoised")
+    result.save(ROOT / output, exposure)
+
+
+def call(words: list[str]) -> None:
+    """Run a command of clvol; click.ClickException where it fails."""
+    if subprocess.run([sys.executable, "-m", "clvol.cli.main", *words], cwd=ROOT).returncode:
         raise click.ClickException(f"{shlex.join(words)} failed; what it said stands above")
+
+
+def scan() -> None:
+    """The picture of a scan, by the lines of gallery.md; skipped without its volume, which is not clvol's."""
+    folder = os.environ.get("CLVOL_DATA", "")
+    if not (Path(folder) / "stent.npz").is_file():
+        click.echo("stent: skipped, since CLVOL_DATA names no folder with stent.npz")
+        return
+    page = (DOCS / "gallery.md").read_text(encoding="utf-8")
+    (lines,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    with tempfile.TemporaryDirectory() as place:
+        (Path(place) / "stent.npz").symlink_to(Path(folder).resolve() / "stent.npz")
+        subprocess.run([sys.executable, "-c", lines], cwd=place, check=True)
+        shutil.copy(Path(place) / "stent.png", DOCS / "pictures")
 
 
 def enclosed(path: Path) -> tuple[str, str]:
@@ -104,9 +146,13 @@ def pictures(names: tuple[str, ...]) -> None:
     """The pictures of docs/, or only those NAMES, by the commands that stand beside them."""
     known = commands()
     for name in names:
-        if name not in known:
-            raise click.BadParameter(f"no page has a command that makes {name!r}, but {', '.join(known)}")
-    for name in names or known:
+        if name not in known and name != "stent":
+            have = ", ".join((*known, "stent"))
+            raise click.BadParameter(f"no page has a command that makes {name!r}, but {have}")
+    for name in names or (*known, "stent"):
+        if name == "stent":
+            scan()
+            continue
         click.echo(shlex.join(known[name]))
         run(known[name], name)
 

@@ -15,7 +15,7 @@ from clvol.planning.choices import NUMBERS, Choices
 from clvol.planning.plan import Plan
 from clvol.rendering.profiler import Profiler, timed
 from clvol.rendering.residence import staying
-from clvol.scene.views import viewed
+from clvol.scene.views import before, viewed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -212,6 +212,8 @@ def plan(scene: Scene, **choices: Any) -> Plan:
         hint = "plan the technique that it chose: the metadata of its render say which"
         raise OptionError("what a pilot chooses is not known before it has rendered", hint=hint)
     names = {family: choices.pop(family, "auto") for family in registry.FAMILIES}
+    if names["background"] == registry.TRANSPARENT:
+        scene, names["background"] = before(scene, registry.TRANSPARENT), "auto"
     for family, name in names.items():
         registry.check_choice(family, name)
     return Plan.of(scene, Choices.for_scene(scene, names, **choices))

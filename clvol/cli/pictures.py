@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from clvol.cli.options import F
     from clvol.picture.result import Result
@@ -115,6 +115,18 @@ class Shown:
                 f"{given} needs a picture for a display to write to, as a .png: "
                 f"{outputs[0]} is as bright as the scene"
             )
+
+    def said(self, result: Result) -> Iterator[str]:
+        """What was chosen for a picture, in a line each."""
+        if self.exposure != self.fixed(result).exposure:
+            yield f"  exposure {self.fixed(result).exposure:+.2f} stops"
+
+    def fixed(self, result: Result) -> Shown:
+        """With the stops that "auto" comes to for a picture, for those that are to look like it."""
+        from clvol.picture.encoding import shown_layers
+        from clvol.picture.exposure import stops_of
+
+        return replace(self, exposure=stops_of(self.exposure, shown_layers(result)[0]))
 
     def encoder(self, result: Result) -> Callable[[str], bytes]:
         """What makes files of a result, by suffix."""

@@ -247,6 +247,7 @@ class Painter:
 
         result = self.result(scene, outputs)
         if not result.stats["interrupted"]:
+            self.shown = self.shown.fixed(result)  # or the film would flicker
             for failure in save_all(self.shown.encoder(result), outputs).values():
                 raise failure
         return result
@@ -268,7 +269,7 @@ class Painter:
             saved = ", saved what there is" if written else ""
             mention([f"clvol: interrupted after {result.samples[1]} spp{saved}"], err=True)
         if not self.quiet:
-            mention(_summary(result, written))
+            mention([*_summary(result, written), *self.shown.said(result)])
         if profiled and result.profile:
             mention(profile_lines(result.profile))
         for failure in failures.values():

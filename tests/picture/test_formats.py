@@ -203,6 +203,12 @@ def test_the_scene_says_what_numbers_its_files_hold(tmp_path: Path) -> None:
     assert code == 2 and "component_format" in said and "float16, float32" in said
 
 
+def test_the_exposure_that_was_chosen_is_said(tmp_path: Path) -> None:
+    code, said = run(tmp_path, "-o", str(tmp_path / "a.png"), "--exposure", "auto")
+    assert code == 0 and "exposure +0.00 stops" in said  # radiance 1 is as bright as paper
+    assert read(tmp_path / "a.png")[1]["exposure"] == "0"
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

@@ -145,4 +145,6 @@ def test_every_scene_and_the_command_of_every_picture_stand_in_the_gallery() -> 
         assert scene.name in gallery
     for picture in re.findall(r"!\[[^\]]+\]\(([^)]+)\)", gallery):
         assert (DOCS / picture).is_file()
-        assert re.search(rf"`clvol render scenes/{Path(picture).stem}.xml -o [^`]+`", gallery)
+        name = Path(picture).stem.removesuffix("-denoised")
+        made = re.search(rf"`clvol render scenes/{name}.xml -o {name}.png [^`]+`", gallery)
+        assert made or f'.save("{name}.png"' in gallery

@@ -141,6 +141,7 @@ def test_an_environment_that_is_seen_is_opaque_as_in_mitsuba():
     plan = clvol.plan(seen)
     assert not plan.counts_alpha and "alpha is 1 everywhere" in " ".join(warnings(plan, {}))
     hidden = replace(seen, integrator=replace(seen.integrator, hide_emitters=True))
+    assert clvol.plan(seen, background="transparent").counts_alpha
     for other in (scene, hidden, replace(seen, emitters=(SUN,))):
         plan = clvol.plan(other)
         assert plan.counts_alpha and not list(warnings(plan, {}))
