@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from clvol.scene.records import Scene
     from clvol.staging.transfer import transfer
     from clvol.staging.volume import volume_scene
+    from clvol.viewer.live import Live, live
     from clvol.volumes.loading import load_volume
 
 __all__ = [
@@ -53,6 +54,7 @@ __all__ = [
     "Error",
     "Frame",
     "Frames",
+    "Live",
     "OptionError",
     "Plan",
     "RayView",
@@ -65,6 +67,7 @@ __all__ = [
     "VolumeError",
     "__version__",
     "compare",
+    "live",
     "load_dict",
     "load_file",
     "load_result",
@@ -112,6 +115,7 @@ _MODULES = {
     "clvol.scene.records": ["Scene"],
     "clvol.staging.volume": ["volume_scene"],
     "clvol.staging.transfer": ["transfer"],
+    "clvol.viewer.live": ["Live", "live"],
     "clvol.volumes.loading": ["load_volume"],
 }
 """The imports above, for those that run clvol rather than read it."""

@@ -1,7 +1,7 @@
 """Pictures that are shown in tev, an image viewer, while they render: over its network protocol.
 
-Its own package makes the packets; the connection is ours, so that a viewer
-that hangs, or goes away, costs seconds and no picture.
+Its own package makes the packets; the connection is ours, so that a viewer that hangs, or goes away, costs
+seconds and no picture.
 """
 
 from __future__ import annotations
