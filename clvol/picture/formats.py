@@ -56,7 +56,7 @@ FORMATS = {
     ".jxl": Format("jpegxl", ("uint8", "uint16")),
     ".bmp": Format("bmp", ("uint8",)),
     ".tga": Format("targa", ("uint8",), most=65535),
-    ".ppm": Format("pnm", ("uint8", "uint16"), alpha=False),
+    ".ppm": Format("pnm", ("uint8",), alpha=False),
     ".dpx": Format("dpx", ("uint8", "uint16")),
     ".hdr": Format("hdr", ("rgbe",), alpha=False, exact=False),
     ".pfm": Format("pnm", ("float32",), alpha=False),
