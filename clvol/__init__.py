@@ -46,10 +46,12 @@ if TYPE_CHECKING:
     from clvol.staging.transfer import transfer
     from clvol.staging.volume import volume_scene
     from clvol.viewer.live import Live, live
+    from clvol.volumes.grid import DenseGrid, SparseGrid
     from clvol.volumes.loading import load_volume
 
 __all__ = [
     "Comparison",
+    "DenseGrid",
     "DeviceError",
     "Error",
     "Frame",
@@ -64,6 +66,7 @@ __all__ = [
     "SceneError",
     "SceneParameters",
     "SelfTest",
+    "SparseGrid",
     "VolumeError",
     "__version__",
     "compare",
@@ -116,6 +119,7 @@ _MODULES = {
     "clvol.staging.volume": ["volume_scene"],
     "clvol.staging.transfer": ["transfer"],
     "clvol.viewer.live": ["Live", "live"],
+    "clvol.volumes.grid": ["DenseGrid", "SparseGrid"],
     "clvol.volumes.loading": ["load_volume"],
 }
 """The imports above, for those that run clvol rather than read it."""

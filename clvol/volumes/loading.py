@@ -12,7 +12,7 @@ from clvol.volumes.repair import sanitized, warn_of
 if TYPE_CHECKING:
     import os
 
-    from clvol.volumes.grid import Grid
+    from clvol.volumes.grid import DenseGrid, SparseGrid
 
 
 def load_volume(
@@ -21,7 +21,7 @@ def load_volume(
     *,
     level_set: str | None = None,
     sanitize: bool = False,
-) -> Grid:
+) -> SparseGrid | DenseGrid:
     """A grid of a volume file, as a gridvolume of a scene takes it (`"data": grid`).
 
     Parameters
