@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from clvol.api.frames import Frame, Frames, progressive
     from clvol.api.renders import plan, render
+    from clvol.api.show import show
     from clvol.errors import DeviceError, Error, OptionError, RenderError, SceneError, VolumeError
     from clvol.lab.comparison import Comparison, compare
     from clvol.lab.ray.trace import trace_ray
@@ -84,6 +85,7 @@ __all__ = [
     "rotate",
     "scale",
     "selftest",
+    "show",
     "trace_ray",
     "transfer",
     "translate",
@@ -94,6 +96,7 @@ __all__ = [
 _MODULES = {
     "clvol.api.frames": ["Frame", "Frames", "progressive"],
     "clvol.api.renders": ["plan", "render"],
+    "clvol.api.show": ["show"],
     "clvol.errors": ["DeviceError", "Error", "OptionError", "RenderError", "SceneError", "VolumeError"],
     "clvol.lab.comparison": ["Comparison", "compare"],
     "clvol.lab.ray.trace": ["trace_ray"],

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from clvol.picture.profile import Profile
+    from clvol.picture.scenery import Scenery
 
 
 def relative_noise(image: np.ndarray, variance: np.ndarray, dof: float = math.inf) -> float:
@@ -86,6 +87,8 @@ class Result:
     denoised : float32 (height, width, 3) or None
         What `denoise` made of the image, with alpha (height, width, 4): to be looked at, and what is shown.
         Nothing is measured in it.
+    scenery : `clvol.picture.scenery.Scenery` or None
+        Where the one volume of the scene is in the picture, for labels; files do not keep it.
     """
 
     image: np.ndarray
@@ -99,6 +102,7 @@ class Result:
     profile: Profile | None = None
     component_format: str | None = None
     denoised: np.ndarray | None = None
+    scenery: Scenery | None = None
 
     def __post_init__(self) -> None:
         self.ranges = self.ranges or (self.samples,)
@@ -186,6 +190,33 @@ class Result:
     def to_pil(self) -> Any:
         """`display` as a ``PIL.Image.Image``; OptionError where Pillow is missing."""
         return need("PIL.Image", "Result.to_pil", "report").fromarray(self.display)
+
+    def plot(
+        self,
+        axes: bool = True,
+        scalar_bar: bool | None = None,
+        box: bool = True,
+        scale_bar: bool | float = False,
+    ) -> Any:
+        """The picture with labels, as a figure of matplotlib's (the extra `science` or `report`).
+
+        Parameters
+        ----------
+        axes : the volume's sides with numbers, in its unit: coordinates, or lengths where it is turned.
+        scalar_bar : the colours of values, and how opaque they are; by default where there is a transfer
+            function.
+        box : the sides of the volume's box, dashed behind it.
+        scale_bar : a bar of a known length at the middle of the volume: True for a round one, or the length.
+
+        Raises
+        ------
+        OptionError
+            There is nothing to label: the result was read from a file, or its scene has not one volume; or
+            matplotlib is missing.
+        """
+        from clvol.picture.plotting import plot
+
+        return plot(self.display, self.scenery, axes, scalar_bar, box, scale_bar)
 
     @property
     def alpha(self) -> np.ndarray | None:

@@ -10,6 +10,7 @@ import numpy as np
 from clvol import layout
 from clvol.picture.result import Result, said_ranges
 from clvol.planning import registry
+from clvol.rendering.labels import scenery_of
 from clvol.version import __version__
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ def make_result(session: Session, first: int, count: int, final: bool = True) ->
         estimate.reshaped(*shape, 3), (first, count), aovs, stats, metadata_of(session, first, samples)
     )
     result.component_format = session.prepared.scene.film.component_format
+    result.scenery = scenery_of(session.prepared)
     if final:
         _warn(session, stats)
         _warn_of_unseen(session, result)

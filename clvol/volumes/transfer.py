@@ -49,7 +49,7 @@ class Transfer:
         at = np.asarray(values, np.float64)
         low = np.clip(np.searchsorted(self.values, at, side="right") - 1, 0, len(self.values) - 2)
         start, end = (self.values[n].astype(np.float64) for n in (low, low + 1))
-        step = (at >= end).astype(np.float64)
+        step = np.array(at >= end, np.float64)
         share = np.divide(at - start, end - start, out=step, where=end > start)
         share = np.clip(share, 0, 1)[..., None]
         colours = self.colours.astype(np.float64)
