@@ -19,10 +19,21 @@ from clvol.version import __version__
 if TYPE_CHECKING:
     from types import FrameType
 
+    from clvol.api.about import Text, devices, info
     from clvol.api.frames import Frame, Frames, progressive
     from clvol.api.renders import plan, render
     from clvol.api.show import show
     from clvol.errors import DeviceError, Error, OptionError, RenderError, SceneError, VolumeError
+    from clvol.device.device import DeviceInfo
+    from clvol.errors import (
+        DeviceError,
+        Error,
+        OptionError,
+        RenderError,
+        SceneError,
+        UnknownOptionError,
+        VolumeError,
+    )
     from clvol.lab.comparison import Comparison, compare
     from clvol.lab.ray.trace import trace_ray
     from clvol.lab.ray.view import RayView
@@ -54,6 +65,7 @@ __all__ = [
     "Comparison",
     "DenseGrid",
     "DeviceError",
+    "DeviceInfo",
     "Error",
     "Frame",
     "Frames",
@@ -68,9 +80,13 @@ __all__ = [
     "SceneParameters",
     "SelfTest",
     "SparseGrid",
+    "Text",
+    "UnknownOptionError",
     "VolumeError",
     "__version__",
     "compare",
+    "devices",
+    "info",
     "live",
     "load_dict",
     "load_file",
@@ -94,10 +110,21 @@ __all__ = [
 ]
 
 _MODULES = {
+    "clvol.api.about": ["Text", "devices", "info"],
     "clvol.api.frames": ["Frame", "Frames", "progressive"],
     "clvol.api.renders": ["plan", "render"],
     "clvol.api.show": ["show"],
     "clvol.errors": ["DeviceError", "Error", "OptionError", "RenderError", "SceneError", "VolumeError"],
+    "clvol.device.device": ["DeviceInfo"],
+    "clvol.errors": [
+        "DeviceError",
+        "Error",
+        "OptionError",
+        "RenderError",
+        "SceneError",
+        "UnknownOptionError",
+        "VolumeError",
+    ],
     "clvol.lab.comparison": ["Comparison", "compare"],
     "clvol.lab.ray.trace": ["trace_ray"],
     "clvol.lab.ray.view": ["RayView"],

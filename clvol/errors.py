@@ -72,3 +72,7 @@ class RenderError(Error):
 
 class OptionError(Error):
     """A choice (technique, majorant, sample count, …) that is unknown or impossible."""
+
+
+class UnknownOptionError(OptionError, TypeError):
+    """A keyword that a function does not know: what Python says with a TypeError."""

@@ -12,7 +12,7 @@ from clvol.api.order import Order
 from clvol.api.renders import render
 from clvol.base.arguments import positive
 from clvol.base.interrupts import interruptible
-from clvol.errors import OptionError, RenderError
+from clvol.errors import OptionError, RenderError, UnknownOptionError
 from clvol.picture.result import Result
 
 if TYPE_CHECKING:
@@ -166,8 +166,8 @@ def progressive(scene: Scene, *, interval: float = 0.25, **options: Any) -> Fram
     ------
     OptionError, SceneError
         At once, for what won't do.  What `render` raises beside these comes with the first frame.
-    TypeError
-        A keyword that `render` does not know.
+    UnknownOptionError
+        A keyword that `render` does not know; a TypeError as well.
     """
     known = {
         name: parameter.default
@@ -176,8 +176,8 @@ def progressive(scene: Scene, *, interval: float = 0.25, **options: Any) -> Fram
     }
     for name in options:
         if name not in known:
-            raise TypeError(f"progressive() takes interval and {', '.join(known)}, not {name!r}")
-    if interval != 0:
+            raise UnknownOptionError(f"progressive takes interval and {', '.join(known)}, not {name!r}")
+    if not isinstance(interval, int | float) or interval != 0:
         positive("interval=", interval, " of seconds")
     order = Order.of("progressive", scene, known | options)
     if not order.count:

@@ -11,7 +11,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from clvol.api.resuming import check_same, resumable, what_is_left
-from clvol.base.arguments import check_seed, positive
+from clvol.base.arguments import check_seed, flag, positive
 from clvol.base.progress import Glance, Progress
 from clvol.device.device import open_device
 from clvol.errors import OptionError, shown
@@ -226,7 +226,7 @@ class Opened:
 
 def _denoises(asked: bool) -> bool:
     """Whether results are denoised; OptionError where they cannot be."""
-    if asked:
+    if flag("denoise", asked):
         need_denoiser()
     return bool(asked)
 
@@ -247,7 +247,7 @@ def _sample_range(
     """First sample and how many; a time limit alone sets no end."""
     if samples is not None and spp is not None:
         raise OptionError("spp and samples exclude each other", hint="samples=(first, count) says both")
-    if time_limit is not None and time_limit != math.inf:
+    if time_limit is not None and not (isinstance(time_limit, float) and time_limit == math.inf):
         positive("time limit ", time_limit, " of seconds")
     if samples is not None:
         if not isinstance(samples, tuple | list) or len(samples) != 2:

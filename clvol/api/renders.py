@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Any, overload
 
 from clvol.api.order import Order, check_scene
+from clvol.base.arguments import flag
 from clvol.base.interrupts import interruptible
 from clvol.base.notebook import progress_bar
-from clvol.errors import OptionError
+from clvol.errors import OptionError, UnknownOptionError, shown
 from clvol.picture.profile import RENDER
 from clvol.planning import registry
 from clvol.planning.choices import NUMBERS, Choices
@@ -143,8 +144,8 @@ def render(  # type: ignore[misc]  # the options of several views are those of o
     if isinstance(sensor, list | tuple):
         return _views(**given)
     order = Order.of("render", scene, given)
-    bar = progress_bar() if progress is True else nullcontext(progress or None)
-    profiler = Profiler() if profile else None
+    bar = _bar(progress)
+    profiler = Profiler() if flag("profile", profile) else None
     with bar as callback:
         opened = order.open(callback, profiler)
         if order.resumed is not None and not order.count:
@@ -162,6 +163,16 @@ def render(  # type: ignore[misc]  # the options of several views are those of o
             result.stats["interrupted"] = interrupt.asked()
     result.profile = profiler.profile(result) if profiler else None
     return result
+
+
+def _bar(progress: object) -> AbstractContextManager[ProgressCallback | None]:
+    """What shows progress, if anything; OptionError for what cannot."""
+    if progress is None or isinstance(progress, bool):
+        return progress_bar() if progress else nullcontext()
+    if not callable(progress):
+        hint = "give True, or a function that takes a record"
+        raise OptionError(f"progress={shown(progress)} is no function", hint=hint)
+    return nullcontext(progress)
 
 
 def _views(scene: Scene, sensor: Sequence[View], **options: Any) -> list[Result]:
@@ -201,13 +212,13 @@ def plan(scene: Scene, **choices: Any) -> Plan:
     ------
     OptionError : a choice that won't do.  What depends on the volumes, as a step that is too fine, `render`
         refuses.  "auto:pilot" is refused: what a pilot chooses is not known before it has rendered.
-    TypeError : a keyword that is no choice.
+    UnknownOptionError : a keyword that is no choice; a TypeError as well.
     """
     scene = check_scene("plan", scene)
     for name in choices:
         if name not in registry.FAMILIES and name not in NUMBERS:
             known = ", ".join((*registry.FAMILIES, *NUMBERS))
-            raise TypeError(f"plan() takes the choices of a render ({known}), not {name!r}")
+            raise UnknownOptionError(f"plan takes the choices of a render ({known}), not {name!r}")
     if choices.get("technique") == registry.PILOT:
         hint = "plan the technique that it chose: the metadata of its render say which"
         raise OptionError("what a pilot chooses is not known before it has rendered", hint=hint)

@@ -7,6 +7,8 @@ import operator
 from numbers import Real
 from typing import Any, cast
 
+import numpy as np
+
 from clvol.errors import OptionError, shown
 
 MOST_SEED = 2**64 - 1
@@ -18,7 +20,11 @@ def positive(name: str, value: object, unit: str = "") -> float:
     `name` is what stands before the value, as in "step=" or "time limit ".
     """
     number = cast("float", value)  # or another real number, as NumPy's are
-    if isinstance(value, bool) or not isinstance(value, Real) or not 0 < number < math.inf:
+    try:
+        fits = isinstance(value, Real) and not isinstance(value, bool) and 0 < float(number) < math.inf
+    except OverflowError:
+        fits = False
+    if not fits:
         raise OptionError(f"{name}{shown(value)} is not a positive number{unit}")
     return number
 
@@ -29,6 +35,21 @@ def whole(name: str, value: Any) -> int:
         return operator.index(value)
     except TypeError:
         raise OptionError(f"{name}={shown(value)} is not a whole number") from None
+
+
+def flag(name: str, value: Any) -> bool:
+    """`value` if it is true or false; OptionError otherwise."""
+    if not isinstance(value, bool | np.bool_):
+        raise OptionError(f"{name}={shown(value)} is neither True nor False")
+    return bool(value)
+
+
+def listed(value: Any) -> list[Any] | None:
+    """The items of anything that can be gone through, a string as one; None for what cannot."""
+    try:
+        return [value] if isinstance(value, str) else list(value)
+    except TypeError:
+        return None
 
 
 def check_seed(seed: Any) -> int:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from clvol.base.files import other_kind
 from clvol.base.memory import format_bytes
-from clvol.errors import OptionError
+from clvol.errors import OptionError, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -30,6 +30,8 @@ _NO_SYNC = (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP)
 
 def output_suffix(path: StrPath, suffixes: Sequence[str]) -> str:
     """Lower-case suffix of the path; OptionError where it is none of `suffixes`."""
+    if not isinstance(path, str | PathLike):
+        raise OptionError(f"a file's name is wanted, not {shown(path)}")
     suffix = Path(path).suffix.lower()
     if suffix not in suffixes:
         raise OptionError(

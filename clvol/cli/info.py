@@ -37,14 +37,20 @@ def info(file: str, grid: str | None, definitions: tuple[tuple[str, str], ...], 
     """Say what a volume or a scene contains.
 
     FILE is a volume (.vdb, .nvdb, .vol, .npy, .npz, medical images, .tif, .h5 and others, see the formats in
-    the documentation): its grids, sizes, boxes, values and memory; or a scene
-    (.xml): its camera, film, media and lights, and the plan of its render: the choices that are in force
-    and why, its features, its stages and what is compiled.  The choices below are those of `clvol render`.
+    the documentation): its grids, sizes, boxes, values and memory; a picture that clvol wrote (.exr): how it
+    was made; or a scene (.xml): its camera, film, media and lights, and the plan of its render: the choices
+    that are in force and why, its features, its stages and what is compiled.  The choices below are those of
+    `clvol render`.
     """
     if Path(file).suffix.lower() == ".xml":
         if grid is not None:
             raise click.UsageError("--grid chooses from a volume file, and this is a scene")
         _tell_scene(file, dict(definitions), choices)
+        return
+    if Path(file).suffix.lower() == ".exr" and grid is None and not definitions:
+        import clvol
+
+        tell([clvol.info(file)])
         return
     from clvol.scene.describe import describe_volume
 
@@ -60,20 +66,6 @@ def info(file: str, grid: str | None, definitions: tuple[tuple[str, str], ...], 
 def _tell_scene(file: str, definitions: dict[str, str], choices: dict[str, Any]) -> None:
     """Print what a scene contains, and the plan of its render with these choices."""
     import clvol
-    from clvol.planning.in_force import warnings
-    from clvol.planning.registry import FAMILIES
-    from clvol.scene.describe import describe_scene
+    from clvol.api.about import scene_lines
 
-    scene = clvol.load_file(file, **definitions)
-    try:
-        plan = clvol.plan(scene, **choices)
-    except clvol.OptionError as refused:
-        if any(value not in ("auto", 1.0, None) for value in choices.values()):
-            raise
-        lines = [
-            f"note: cannot be rendered as it is: {refused}"
-        ]  # its own choices; it is described all the same
-    else:
-        asked = {family: choices[family] for family in FAMILIES}
-        lines = [*plan.describe(), *(f"note: {warning}" for warning in warnings(plan, asked))]
-    tell(map(printable, [*describe_scene(scene), "", *lines]))
+    tell(map(printable, scene_lines(clvol.load_file(file, **definitions), choices)))

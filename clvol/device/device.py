@@ -161,8 +161,10 @@ def open_device(pattern: str | None = None) -> Device:
     Raises DeviceError where there is none.
     """
     found = _usable()
-    pattern = pattern if pattern is not None else os.environ.get("CLVOL_DEVICE")
-    if pattern:
+    pattern = pattern if pattern is not None else os.environ.get("CLVOL_DEVICE", "")
+    if not isinstance(pattern, str | int) or isinstance(pattern, bool):
+        raise DeviceError(f"a device is a number or part of a name, not {shown(pattern)}")
+    if pattern != "":
         chosen = [pair for pair in found if pair[0].matches(str(pattern))]
         if not chosen:
             names = "; ".join(f"{info.index}: {info.name} ({info.platform})" for info, _ in found)

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
 
+from clvol.base.arguments import listed
 from clvol.errors import OptionError, shown
 from clvol.planning.registry import FAMILIES, PILOT, check_choice
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
 
 log = logging.getLogger("clvol")
 
@@ -38,9 +42,9 @@ def names_asked(options: Mapping[str, str | Iterable[str]]) -> dict[str, tuple[s
 
 def split_names(family: str, value: str | Iterable[str]) -> tuple[str, ...]:
     """Names of one family, in the order given; OptionError for none, and for one that won't do here."""
-    if not isinstance(value, Iterable):
+    parts = value.split(",") if isinstance(value, str) else listed(value)
+    if parts is None:
         raise OptionError(f"{family}: {shown(value)} is not a list of names", hint="give strings")
-    parts = value.split(",") if isinstance(value, str) else list(value)
     names = [name for part in parts if (name := str(part).strip())]
     if not names:
         raise OptionError(f"no {family} is given", hint="give a name, several with commas, or auto")

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.base.arguments import check_seed, positive, whole
+from clvol.base.arguments import check_seed, flag, positive, whole
 from clvol.device.device import Device, open_device
 from clvol.errors import OptionError, shown
 from clvol.lab.combinations import (
@@ -119,7 +119,7 @@ def selftest(
     seed = check_seed(seed)
     if spp is not None and not 1 <= whole("spp", spp) <= MAX_SAMPLES:
         raise OptionError(f"spp={spp} cannot be rendered", hint=f"give 1 to {MAX_SAMPLES}")
-    effort = QUICK if quick else FULL
+    effort = QUICK if flag("quick", quick) else FULL
     tell = progress or (lambda what, done, total: None)
     small, opened = reduced(scene, effort.pixels), open_device(device)
     tell("kernels", 0, 1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clvol.errors import OptionError
+from clvol.errors import OptionError, shown
 
 MOST_STOPS = 100.0
 """Exposures beyond it are no pictures, and overflow."""
@@ -22,11 +22,11 @@ _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 def check_exposure(exposure: float | str) -> None:
     """OptionError for what is neither "auto" nor a number of stops up to `MOST_STOPS`, either way."""
-    if exposure == AUTO:
+    if isinstance(exposure, str) and exposure == AUTO:
         return
     if not (isinstance(exposure, int | float | np.number) and abs(exposure) <= MOST_STOPS):
         raise OptionError(
-            f"exposure {exposure} is not a number from {-MOST_STOPS:g} to {MOST_STOPS:g} stops",
+            f"exposure {shown(exposure)} is not a number from {-MOST_STOPS:g} to {MOST_STOPS:g} stops",
             hint=f"or '{AUTO}'",
         )
 
@@ -34,7 +34,7 @@ def check_exposure(exposure: float | str) -> None:
 def stops_of(exposure: float | str, image: np.ndarray) -> float:
     """The number of stops itself, or what "auto" comes to for a picture."""
     check_exposure(exposure)
-    return auto_exposure(image) if exposure == AUTO else float(exposure)
+    return auto_exposure(image) if isinstance(exposure, str) else float(exposure)
 
 
 def auto_exposure(image: np.ndarray) -> float:

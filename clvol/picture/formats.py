@@ -72,13 +72,15 @@ def is_linear(component: str) -> bool:
 
 def component_of(suffix: str, *wishes: str | None) -> str:
     """What the numbers of such a file are: the first of the wishes that it can hold, else what is usual."""
+    if not isinstance(suffix, str) or suffix not in FORMATS:
+        raise OptionError(f"unknown format {shown(suffix)}", hint=f"choose one of {', '.join(SUFFIXES)}")
     known = FORMATS[suffix].components
-    return next((wish for wish in wishes if wish in known), known[0])
+    return next((wish for wish in wishes if isinstance(wish, str) and wish in known), known[0])
 
 
 def check_component(suffix: str, asked: str) -> None:
     """OptionError where such a file cannot hold these numbers."""
-    if asked not in COMPONENTS:
+    if not isinstance(asked, str) or asked not in COMPONENTS:
         hint = f"choose among {', '.join(COMPONENTS)}"
         raise OptionError(f"unknown component_format {shown(asked)}", hint=hint)
     known = FORMATS[suffix].components

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import reduce
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from clvol.base.arguments import listed
 from clvol.errors import OptionError, shown
 from clvol.picture.estimate import Uneven
 from clvol.picture.result import Result, said_ranges
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from clvol.picture.estimate import Estimate, Ranges
 
@@ -60,9 +60,10 @@ def merge(results: Iterable[Result]) -> Result:
         No results, or something else; overlapping sample ranges; or another size, scene, seed or choice:
         which, it says.
     """
-    if isinstance(results, Result) or not isinstance(results, Iterable):
+    given = None if isinstance(results, Result) else listed(results)
+    if given is None:
         raise OptionError("merge takes a list of results", hint="merge([a, b])")
-    results = list(results)
+    results = given
     if not results:
         raise OptionError("nothing to merge", hint="give at least one result")
     for one in results:

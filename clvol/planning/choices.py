@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
-from clvol.base.arguments import positive
+from clvol.base.arguments import listed, positive
 from clvol.errors import OptionError, shown
 from clvol.planning import registry
 from clvol.planning.names import Names
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
     from clvol.scene.records import Scene
 
 
@@ -84,12 +85,10 @@ class Choices:
 
 
 def _aovs(names: str | Iterable[str]) -> tuple[str, ...]:
-    names = (names,) if isinstance(names, str) else names
-    if not isinstance(names, Iterable):
-        raise OptionError(
-            f"aov={shown(names)} is not a list of names", hint=f"choose among {', '.join(registry.AOVS)}"
-        )
-    for name in names:
-        if not isinstance(name, str) or name not in registry.AOVS:
-            raise OptionError(f"unknown aov {shown(name)}", hint=f"choose among {', '.join(registry.AOVS)}")
-    return tuple(dict.fromkeys(names))
+    given, known = listed(names), list(registry.AOVS)
+    if given is None:
+        raise OptionError(f"aov={shown(names)} is not a list of names", hint=registry.choose_among(known))
+    for name in given:
+        if not isinstance(name, str) or name not in known:
+            raise OptionError(f"unknown aov {shown(name)}", hint=registry.choose_among(known, name))
+    return tuple(dict.fromkeys(given))

@@ -14,6 +14,8 @@ from clvol.errors import OptionError, shown
 from clvol.layout import COUNTS
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from clvol.accel.controls import Control
 
 
@@ -289,6 +291,11 @@ def check_choice(family: str, value: str, pilot: bool = False) -> str:
     choices = [*(automatic(family) if pilot else ["auto"]), *FAMILIES[family]]
     if isinstance(value, str) and value in choices:
         return value
-    close = difflib.get_close_matches(value[:64], choices, n=1) if isinstance(value, str) else []
+    raise OptionError(f"unknown {family} {shown(value)}", hint=choose_among(choices, value))
+
+
+def choose_among(choices: Sequence[str], given: object = None) -> str:
+    """The hint that lists choices, and the one that a wrong name comes near to."""
+    close = difflib.get_close_matches(given[:64], choices, n=1) if isinstance(given, str) else []
     guess = f"did you mean {close[0]!r}? " if close else ""
-    raise OptionError(f"unknown {family} {shown(value)}", hint=f"{guess}choose one of {', '.join(choices)}")
+    return f"{guess}choose one of {', '.join(choices)}"

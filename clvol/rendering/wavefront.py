@@ -17,6 +17,7 @@ import numpy as np
 import pyopencl as cl
 
 from clvol import layout
+from clvol.base.arguments import whole
 from clvol.device.launch import launch, scene_arguments, set_arguments
 from clvol.errors import OptionError
 from clvol.rendering.film import Film
@@ -62,6 +63,7 @@ class Pool:
         """Pool for a device; `slots` is rounded up to whole groups."""
         if slots is None:
             slots = 1 << 15 if device.is_cpu else 1 << 20
+        slots = whole("pool", slots)
         if not 1 <= slots <= 1 << 26:
             raise OptionError(f"a pool of {slots} paths", hint="give 1 to 67108864")
         groups = max(1, -(-slots // plan.tuning.group_slots))

@@ -32,7 +32,8 @@ def viewed(
     """The scene `seen_by` a sensor, `in_size`, and `before` a transparent background, where asked for."""
     scene = scene if sensor is None else seen_by(scene, sensor)
     scene = scene if size is None else in_size(scene, size)
-    return before(scene, background) if background == TRANSPARENT else scene
+    transparent = isinstance(background, str) and background == TRANSPARENT
+    return before(scene, background) if transparent else scene
 
 
 def seen_by(scene: Scene, sensor: View) -> Scene:

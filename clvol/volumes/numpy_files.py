@@ -76,9 +76,12 @@ def check_layout(dtype: np.dtype, shape: tuple[int, ...], where: str) -> None:
         raise VolumeError(f"an array of {dtype} is not supported, real numbers are", where)
     if len(shape) not in (3, 4):
         axes = f"an array of {len(shape)} axes, shape {shape}, is not supported"
-        raise VolumeError(axes, where, "give it the axes [z, y, x] or [z, y, x, channel]")
+        hint = "give it the axes [z, y, x] or [z, y, x, channel]"
+        if len(shape) == 5:
+            hint += "; of (t, z, y, x, channel) one time is array[0]"
+        raise VolumeError(axes, where, hint)
     if len(shape) == 4 and shape[3] not in (1, 3):
-        hint = "give one array [z, y, x] at a time, such as array[0]"
+        hint = "if the axes are (t, z, y, x), give one time of it, as array[0]; of others one array [z, y, x]"
         if shape[0] in (1, 3):
             hint = "put the channels last: numpy.moveaxis(array, 0, -1)"
         last = f"an array of shape {shape} is no [z, y, x, channel]: the last axis has 1 or 3 channels"

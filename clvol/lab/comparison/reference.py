@@ -12,7 +12,7 @@ import numpy as np
 
 from clvol.base.files import other_kind
 from clvol.base.image_reading import UnreadableError, read_stored
-from clvol.errors import OptionError
+from clvol.errors import OptionError, shown
 from clvol.scene.digest import scene_digest
 
 if TYPE_CHECKING:
@@ -83,7 +83,9 @@ def read_reference(path: str | os.PathLike[str], scene: Scene) -> Reference:
     ------
     OptionError : a file that cannot be read, of another size, without colours, or with values not finite.
     """
-    where = os.fspath(path)
+    if not isinstance(path, str | os.PathLike):
+        raise OptionError(f"a reference is a file's name or a number of samples, not {shown(path)}")
+    where = str(path)
     planes, metadata = _read_planes(where)
     missing = [name for name in "RGB" if name not in planes]
     if missing:

@@ -32,6 +32,11 @@ MANY = 1 << 16
 MOST_SHOWN = 100
 
 
+def _given(names: object) -> bool:
+    """Whether names are given at all: neither None nor an empty list."""
+    return names is not None and not (isinstance(names, str | list | tuple) and not names)
+
+
 def trace_ray(
     scene: Scene,
     x: int,
@@ -98,8 +103,10 @@ def trace_ray(
     unknown = set(choices) - known
     if unknown:
         raise OptionError(f"trace_ray has no choice {min(unknown)!r}")
-    techniques = split_names("technique", techniques) if techniques else techniques
-    transmittances = split_names("transmittance", transmittances) if transmittances else transmittances
+    techniques, transmittances = (
+        split_names(family, names) if _given(names) else names
+        for family, names in (("technique", techniques), ("transmittance", transmittances))
+    )
     asked = {*(techniques or ()), *(transmittances or ())}
     if choices.get("step") is not None and "marching" not in asked:
         raise OptionError("step is for ray marching, and nothing marches here", hint="name marching too")
