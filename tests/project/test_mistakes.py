@@ -124,10 +124,8 @@ def test_choices_are_listed_alike_everywhere(scene: clvol.Scene) -> None:
 
 
 def test_arrays_over_time_have_a_hint_of_their_own() -> None:
-    for shape, hint in (
-        ((5, 4, 4, 4), r"\(t, z, y, x\), give one time"),
-        ((5, 4, 4, 4, 3), "one time is arr"),
-    ):
+    hints = {(5, 4, 4, 4): r"\(t, z, y, x\), give one time", (5, 4, 4, 4, 3): "one time is array"}
+    for shape, hint in hints.items():
         volume = {"type": "gridvolume", "grid": np.ones(shape)}
         medium = {"type": "heterogeneous", "sigma_t": volume}
         cube = {"type": "cube", "bsdf": {"type": "null"}, "interior": medium}

@@ -32,9 +32,11 @@ MANY = 1 << 16
 MOST_SHOWN = 100
 
 
-def _given(names: object) -> bool:
-    """Whether names are given at all: neither None nor an empty list."""
-    return names is not None and not (isinstance(names, str | list | tuple) and not names)
+def _split(family: str, names: Sequence[str] | None) -> Sequence[str] | None:
+    """The names of a family, where there are any: neither None nor an empty list."""
+    if names is None or (isinstance(names, str | list | tuple) and not names):
+        return names
+    return split_names(family, names)
 
 
 def trace_ray(
@@ -103,10 +105,7 @@ def trace_ray(
     unknown = set(choices) - known
     if unknown:
         raise OptionError(f"trace_ray has no choice {min(unknown)!r}")
-    techniques, transmittances = (
-        split_names(family, names) if _given(names) else names
-        for family, names in (("technique", techniques), ("transmittance", transmittances))
-    )
+    techniques, transmittances = _split("technique", techniques), _split("transmittance", transmittances)
     asked = {*(techniques or ()), *(transmittances or ())}
     if choices.get("step") is not None and "marching" not in asked:
         raise OptionError("step is for ray marching, and nothing marches here", hint="name marching too")
