@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from clvol.api.frames import Frame, Frames, progressive
     from clvol.api.renders import plan, render
     from clvol.api.show import show
-    from clvol.errors import DeviceError, Error, OptionError, RenderError, SceneError, VolumeError
     from clvol.device.device import DeviceInfo
     from clvol.errors import (
         DeviceError,
@@ -114,7 +113,6 @@ _MODULES = {
     "clvol.api.frames": ["Frame", "Frames", "progressive"],
     "clvol.api.renders": ["plan", "render"],
     "clvol.api.show": ["show"],
-    "clvol.errors": ["DeviceError", "Error", "OptionError", "RenderError", "SceneError", "VolumeError"],
     "clvol.device.device": ["DeviceInfo"],
     "clvol.errors": [
         "DeviceError",
