@@ -161,6 +161,7 @@ def sampler_rows(name: str, rounds: int) -> list[str]:
         samplers=list(SAMPLERS),
         spp=64,
         rounds=rounds,
+        reference_spp=16 * 64,
     )
     first = comparison.figures[0]
     rows = []

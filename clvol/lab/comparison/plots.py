@@ -32,6 +32,8 @@ STYLE: dict[Any, Any] = {
     "grid.linewidth": 0.7,
     "legend.frameon": False,
 }
+_LEGEND = 64
+"""Characters that a row of a legend has room for."""
 UNITS = {"spp": "samples a pixel", "seconds": "seconds", "lookups": "density look-ups"}
 
 
@@ -85,7 +87,10 @@ def _errors(findings: Findings, curves: list[_Drawn], unit: str) -> bytes:
     """Relative MSE over one cost, log-log, with bands and a guide of the slope that noise has."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(4.4, 3.7), layout="constrained")
+    longest = max(len(figures.label) for figures in findings.figures)
+    columns = min(3, max(1, _LEGEND // (longest + 6)))
+    rows = -(-(len(findings.figures) + 1) // columns)
+    figure = Figure(figsize=(4.4, 3.4 + 0.17 * rows), layout="constrained")
     axes = figure.add_subplot()
     starts = []
     for number, (figures, curve) in enumerate(zip(findings.figures, curves, strict=True)):
@@ -106,7 +111,7 @@ def _errors(findings: Findings, curves: list[_Drawn], unit: str) -> bytes:
     plain_ticks(axes.yaxis)
     axes.grid(True, which="minor", color="#f2f2f2", linewidth=0.5)
     if starts:  # an error to show, and so an entry
-        figure.legend(fontsize=8, loc="outside lower center", ncols=3)
+        figure.legend(fontsize=8, loc="outside lower center", ncols=columns)
     return _png(figure)
 
 
