@@ -45,8 +45,8 @@ log = logging.getLogger("clvol.pilot")
 CHOSEN = ("technique", "transmittance", "majorant")
 """What a pilot chooses, in this order.
 
-Every choice of another family costs a set of kernels, as long to build as a short pilot may render, and auto's
-rules for those were measured."""
+Every choice of another family costs a set of kernels, as long to build as a short pilot may render, and the
+rules of auto for those were measured."""
 SHARE, LEAST_SECONDS, MOST_SECONDS = 0.1, 5.0, 120.0
 """Of the expected render, and the bounds of what a pilot may take; kernel builds come on top."""
 ROUNDS = 2
