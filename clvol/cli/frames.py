@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from clvol.picture.result import Result
     from clvol.picture.video import Film
     from clvol.scene.records import Scene
+    from clvol.staging.fixed import Fixed
     from clvol.staging.source import Source
-    from clvol.staging.stage import Fixed
 
 FAILED = 1
 """Exit status where some frames could not be rendered."""

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
     from clvol.cli.options import F
     from clvol.scene.records import Scene
+    from clvol.staging.fixed import Fixed
     from clvol.staging.source import Source
-    from clvol.staging.stage import Fixed
 
     _OptionType = click.ParamType[Any, Any]
 else:

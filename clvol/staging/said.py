@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from types import SimpleNamespace
 
+    from clvol.staging.fixed import Fixed
     from clvol.staging.framing import View
     from clvol.staging.medium import Grids, Scales
-    from clvol.staging.stage import Fixed
     from clvol.staging.thickness import Rays
 
 

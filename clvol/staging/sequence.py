@@ -9,10 +9,11 @@ import numpy as np
 
 from clvol.errors import Error
 from clvol.staging.coarse import extremes
+from clvol.staging.fixed import Fixed
 from clvol.staging.medium import Grids, Scales, choose_scales
 from clvol.staging.options import checked
 from clvol.staging.source import Source
-from clvol.staging.stage import Fixed, measured_rays, settle
+from clvol.staging.stage import measured_rays, settle
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

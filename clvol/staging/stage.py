@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import product
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -13,14 +12,14 @@ from clvol.scene.loader import load_staged
 from clvol.scene.records import GridVolume
 from clvol.scene.transforms import rotate, scale, translate
 from clvol.scene.views import check_size
+from clvol.staging.fixed import Fixed
 from clvol.staging.framing import FOV, Axes, View, frame, revolved
 from clvol.staging.lights import environment_file, look_emitters
 from clvol.staging.looks import LOOKS
-from clvol.staging.medium import ALBEDO, DARK, Grids, Scales, choose_scales, medium
+from clvol.staging.medium import ALBEDO, DARK, Grids, choose_scales, medium
 from clvol.staging.options import TRANSPARENT, VIEWS, checked
 from clvol.staging.said import said
 from clvol.staging.thickness import Rays
-from clvol.staging.up import guess_up
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -37,42 +36,6 @@ DIMMED = 0.4
 """What all light is multiplied by where the volume glows by itself."""
 FLOOR, FLOOR_SIZE = 0.12, 40.0
 """Reflectance of the floor, and its radius in diagonals of the box."""
-
-
-@dataclass(frozen=True, eq=False)
-class Fixed:
-    """What all frames of a sequence share.
-
-    Parameters
-    ----------
-    points : (n, 3), the outermost of what is seen in the world.
-    up : the axis, and why.
-    burns, flames : whether anything glows, and whether flames say what.
-    peak : the greatest temperature.
-    scales : what the values of the grids are multiplied by; None to choose them.
-    limits : least and greatest value of the density, where something is made of its values.
-    """
-
-    points: np.ndarray
-    up: tuple[str, str]
-    burns: bool
-    flames: bool
-    peak: float
-    scales: Scales | None = None
-    limits: tuple[float, float] | None = None
-
-    @classmethod
-    def of(cls, source: Source, grids: Grids, options: SimpleNamespace) -> Fixed:
-        """Of one volume."""
-        up = (options.up, "") if options.up else guess_up(source.path)
-        heat = grids.heat.peak if grids.burns and grids.heat is not None else 0.0
-        limits = grids.density.limits if grids.density.look else None
-        return cls(shown_points(grids), up, grids.burns, grids.flame is not None, heat, limits=limits)
-
-    @property
-    def box(self) -> np.ndarray:
-        """Box (2, 3) round the points."""
-        return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,13 +130,6 @@ def angles(options: SimpleNamespace) -> tuple[float, float]:
         azimuth if options.azimuth is None else options.azimuth,
         elevation if options.elevation is None else options.elevation,
     )
-
-
-def shown_points(grids: Grids) -> np.ndarray:
-    """The outermost points (n, 3) in the world of what is seen; the unit cube's where that is nothing."""
-    if grids.density.empty:
-        return np.array(list(product((0.0, 1.0), repeat=3)))
-    return grids.density.outermost()
 
 
 def sensor(
