@@ -144,6 +144,13 @@ def _words(scene: str, definitions: tuple[tuple[str, str], ...], options: dict[s
         elif value is True:
             words.append(spelled(name))
         else:
-            text = ",".join(f"{one:.9g}" for one in value) if isinstance(value, tuple) else str(value)
+            text = ",".join(f"{one:.9g}" for one in value) if isinstance(value, tuple) else _plain(value)
             words += [spelled(name), text]
     return words
+
+
+def _plain(value: Any) -> str:
+    """A value as the command line has it; of transfer functions these are names of presets."""
+    from clvol.staging.transfer import Look
+
+    return value.name if isinstance(value, Look) else str(value)

@@ -26,7 +26,8 @@ def assign(scene: Scene, assignments: Iterable[Assignment]) -> None:
     """Set parameters of a scene, all of them or none.
 
     Values are numbers with commas between them: one, a colour's or a direction's three, the two of a size.
-    Transforms have 16, or the 9 of `look_at`: origin, target, up.
+    Transforms have 16, or the 9 of `look_at`: origin, target, up.  Transfer functions have points, as
+    ``-500: 0, 300: 0.5``.
 
     Raises
     ------
@@ -43,6 +44,8 @@ def assign(scene: Scene, assignments: Iterable[Assignment]) -> None:
 
 def value_of(name: str, text: str) -> Any:
     """What the text of a value stands for, as `SceneParameters` takes it."""
+    if ":" in text:
+        return text
     try:
         found = [_number(word) for word in re.split(r"\s*,\s*", text.strip())]
     except ValueError:

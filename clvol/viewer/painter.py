@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,8 @@ COARSER = (1, 2, 3, 4, 6, 8)
 """What the sides of a picture in motion are divided by."""
 MOVING_SECONDS = 0.2
 """That a picture in motion may take."""
+CLEAN_PACE = 3.0
+"""Times what denoising took that passes before the next."""
 SMALLEST = 16
 """Pixels of its sides, at least."""
 
@@ -76,6 +79,7 @@ class Painter:
         self._closed = False
         self._frames: Frames | None = None
         self._rate = math.nan
+        self._clean_due = 0.0
         self._news = threading.Condition()
         self._thread = threading.Thread(target=self._work, name="clvol painter", daemon=True)
         self._thread.start()
@@ -117,6 +121,7 @@ class Painter:
             self._out(replace(last, wish=wish))
             return
         self.subject.turn(wish)
+        self._clean_due = 0.0
         for size in self._coarse_sizes():
             self._render(wish, size, 1, coarse=True)
         assert self.subject.size is not None
@@ -127,7 +132,7 @@ class Painter:
         with self._news:
             if self._outdated(wish):
                 return
-            chosen = {name: getattr(wish, name) for name in ("technique", "transmittance", "denoise")}
+            chosen = {name: getattr(wish, name) for name in ("technique", "transmittance")}
             options = {**self.options, **chosen, "sensor": self.subject.sensor, "size": size, "spp": spp}
             self._frames = frames = progressive(self.subject.scene, **options)
         try:
@@ -148,7 +153,22 @@ class Painter:
 
     def _out(self, painted: Painted) -> None:
         self.latest, self._rate = painted, painted.rate
+        if not painted.wish.denoise or painted.coarse:
+            painted.result.denoised = None
+            painted.result.metadata.pop("denoised", None)
+        elif not self._denoised(painted):
+            return
         self._show(painted)
+
+    def _denoised(self, painted: Painted) -> bool:
+        """Denoise a picture, without guides, as long as that leaves time to render; whether it was."""
+        started = time.perf_counter()
+        if started < self._clean_due and not painted.is_last:
+            return False
+        painted.result.denoise()
+        now = time.perf_counter()
+        self._clean_due = now + CLEAN_PACE * (now - started)
+        return True
 
     def _coarse_sizes(self) -> Iterator[tuple[int, int]]:
         """At first what takes no longer than a picture in motion may, then twice as wide, and so on."""

@@ -74,6 +74,8 @@ class Server:
             need(module, "the viewer", "view")
         import uvicorn
 
+        if first is not None and first.denoise:
+            need_denoiser()
         self.subject, self.first = subject, first or Wish()
         self.token = secrets.token_urlsafe(24)
         self._socket = _listening(host, port)
@@ -147,9 +149,16 @@ class Server:
             return PlainTextResponse("no such picture", 404, headers=_HEADERS)
         if painted is None:
             return PlainTextResponse("there is no picture yet", 503, headers=_HEADERS)
-        data = await asyncio.to_thread(painted.result.encode, f".{kind}", painted.wish.exposure)
+        data = await asyncio.to_thread(self._file_of, painted, f".{kind}")
         headers = {**_HEADERS, "Content-Disposition": f'attachment; filename="view.{kind}"'}
         return Response(data, media_type=_PICTURES[kind], headers=headers)
+
+    @staticmethod
+    def _file_of(painted: Painted, suffix: str) -> bytes:
+        """As the picture is shown; those between the pictures of a page may not be denoised yet."""
+        if painted.wish.denoise and painted.result.denoised is None:
+            painted.result.denoise()
+        return painted.result.encode(suffix, painted.wish.exposure)
 
     async def _live(self, connection: WebSocket) -> None:
         """One page: its wishes come in, pictures go out."""

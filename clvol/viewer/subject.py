@@ -15,6 +15,7 @@ from clvol.scene.parameters import traverse
 from clvol.scene.transforms import rotate
 from clvol.scene.views import viewed
 from clvol.staging.framing import Axes
+from clvol.volumes.transfer import transfer_of_points
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -27,10 +28,11 @@ _ENDINGS = {
     "density": "_medium.scale",
     "glow": ".emission_scale",
     "anisotropy": ".phase_function.g",
+    "opacity": "_medium.opacity",
 }
 """How the names of knobs' parameters end."""
-_STEEPEST = 1 - 1e-6
-"""Cosine between a camera's axis and the vertical from which on there is no horizon."""
+_COLOURS = 33
+"""Of a transfer function, that a page is told."""
 
 
 @dataclass(eq=False)
@@ -84,9 +86,22 @@ class Subject:
         }
         if names := self._knobs["anisotropy"]:
             found["anisotropy"] = first[names[0]]
+        if names := self._knobs["opacity"]:
+            found["opacity"] = first[names[0]]
+            found["colours"] = self._colours(names[0])
         if self._sun:
             found["sun"] = _angles(self.axes, -np.array(first[self._sun]))
         return found
+
+    def _colours(self, opacity: str) -> list[list[float]]:
+        """Linear colours of values, evenly over those of the transfer function."""
+        name = opacity.removesuffix("opacity") + "albedo"
+        values = [value for value, _ in self._first[opacity]]
+        if name not in self.parameters:
+            return []
+        albedo = transfer_of_points(self.parameters[name])
+        colours: list[list[float]] = albedo(np.linspace(values[0], values[-1], _COLOURS)).tolist()
+        return colours
 
     def _view(self) -> tuple[list[float], ...]:
         """Origin, target and up of the camera as it stood: it turns about the middle of the media."""
@@ -107,6 +122,9 @@ class Subject:
                 found += [(name, _text(np.ravel(self._first[name]) * factor)) for name in self._knobs[knob]]
         if wish.anisotropy is not None:
             found += [(name, _text([wish.anisotropy])) for name in self._knobs["anisotropy"]]
+        if wish.opacity is not None:
+            points = ", ".join(f"{_plain(value)}: {_plain(number)}" for value, number in wish.opacity)
+            found += [(name, points) for name in self._knobs["opacity"]]
         if self._sun and (wish.azimuth is not None or wish.elevation is not None):
             azimuth, elevation = _angles(self.axes, -np.array(self._first[self._sun]))
             azimuth = azimuth if wish.azimuth is None else wish.azimuth

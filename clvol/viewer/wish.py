@@ -22,7 +22,9 @@ _LIMITS = {
 }
 """Of what is a number, the least and the greatest."""
 _LARGEST = 1e15
-"""Of a camera's numbers."""
+"""Of a camera's numbers, and of a transfer function's."""
+_POINTS = 256
+"""Of a transfer function, at most."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,7 @@ class Wish:
     anisotropy : of all media that have one.
     azimuth, elevation : degrees of where the sun stands.
     turn : degrees by which the environment is turned.
+    opacity : points of the transfer function, as (value, extinction).
     technique, transmittance : names from the registry.
     denoise : show it without its noise.
     exposure : stops, or "auto".
@@ -48,6 +51,7 @@ class Wish:
     azimuth: float | None = None
     elevation: float | None = None
     turn: float = 0.0
+    opacity: tuple[tuple[float, ...], ...] | None = None
     technique: str = "auto"
     transmittance: str = "auto"
     denoise: bool = False
@@ -66,12 +70,13 @@ class Wish:
     @property
     def rendered(self) -> tuple[Any, ...]:
         """What another render is needed for, when it changes."""
-        return *self.seen, self.technique, self.transmittance, self.denoise
+        return *self.seen, self.technique, self.transmittance
 
     @property
     def seen(self) -> tuple[Any, ...]:
         """What the picture depends on, but for its noise."""
-        return self.camera, self.density, self.glow, self.anisotropy, self.azimuth, self.elevation, self.turn
+        medium = self.density, self.glow, self.anisotropy, self.opacity
+        return self.camera, *medium, self.azimuth, self.elevation, self.turn
 
 
 def _checked(name: str, value: Any) -> Any:
@@ -81,6 +86,10 @@ def _checked(name: str, value: Any) -> Any:
         if not isinstance(value, list) or len(value) != _VIEW:
             raise OptionError(f"a camera has {_VIEW} numbers", hint="origin, target, up")
         return tuple(_number(name, one, -_LARGEST, _LARGEST) for one in value)
+    if name == "opacity":
+        if not isinstance(value, list) or not 1 <= len(value) <= _POINTS:
+            raise OptionError(f"a transfer function has 1 to {_POINTS} points here")
+        return tuple(_point(point) for point in value)
     if name == "denoise":
         if not isinstance(value, bool):
             raise OptionError(f"denoise must be true or false, not {shown(value)}")
@@ -88,6 +97,12 @@ def _checked(name: str, value: Any) -> Any:
     if name == "exposure" and value == "auto":
         return value
     return _number(name, value, *_LIMITS[name])
+
+
+def _point(value: Any) -> tuple[float, ...]:
+    if not isinstance(value, list) or len(value) != 2:
+        raise OptionError(f"a point of a transfer function is a value and a number, not {shown(value)}")
+    return _number("value", value[0], -_LARGEST, _LARGEST), _number("opacity", value[1], 0.0, _LARGEST)
 
 
 def _number(name: str, value: Any, least: float, most: float) -> float:

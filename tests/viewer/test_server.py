@@ -21,6 +21,7 @@ from viewing import SLAB, page_of, serving
 import clvol
 from clvol.cli.main import main
 from clvol.errors import OptionError
+from clvol.scene.assignments import assign
 from clvol.viewer.server import Server
 from clvol.viewer.subject import Subject
 from clvol.viewer.wish import Wish
@@ -131,14 +132,19 @@ def test_denoising_shows_another_picture_of_the_same_samples(server: Any, tmp_pa
     pytest.importorskip("pyoidn", reason="denoising needs pyoidn, of the extra denoise")
     with page_of(server) as page:
         noisy = shown(server, page, {"density": 1.25})
-        image = server.painter.latest.result.image
+        rendered = server.painter.latest.result
         clean = shown(server, page, {"density": 1.25, "denoise": True})
-        assert np.array_equal(server.painter.latest.result.image, image)
-    assert clean["data"] != noisy["data"] and clean["noise"] == noisy["noise"]
+        assert server.painter.latest.result is rendered and rendered.denoised is not None
+        again = shown(server, page, {"density": 1.25})
+    assert clean["data"] != noisy["data"] == again["data"] and clean["noise"] == noisy["noise"]
 
 
 HOSTILE = [
     '{"denoise": 1}',
+    '{"opacity": []}',
+    '{"opacity": [1, 2]}',
+    '{"opacity": [[1, -2]]}',
+    '{"opacity": [[1, NaN]]}',
     b"\x00\xff",
     "",
     "{",
@@ -234,6 +240,28 @@ def test_sun_and_environment_turn_about_the_vertical() -> None:
     assert parameters["sky.to_world"][:3, :3] @ [1, 0, 0] == pytest.approx([0, 1, 0], abs=1e-7)
     subject.turn(Wish())
     assert parameters_of(scene, "sun.direction") == pytest.approx((0, 1, 0))
+
+
+def test_a_transfer_function_is_bent_by_its_points(tmp_path: Path) -> None:
+    volume = np.linspace(0, 1, 64, dtype=np.float32).reshape(4, 4, 4)
+    np.save(tmp_path / "v.npy", volume)
+    scene = clvol.volume_scene(
+        str(tmp_path / "v.npy"), transfer={"opacity": [(0, 0), (1, 9)], "colour": [(0, 0.5), (1, 0.9)]}
+    )
+    subject = Subject(scene, ["clvol", "render", "v.npy"])
+    about = subject.described()
+    assert about["opacity"] == [(0, 0), (1, 9)] and len(about["colours"]) == 33
+    wish = Wish.of({"opacity": [[0.25, 0], [0.5, 4]]})
+    subject.turn(wish)
+    assert parameters_of(scene, "volume.interior_medium.opacity") == [(0.25, 0), (0.5, 4)]
+    assert "'volume.interior_medium.opacity=0.25: 0, 0.5: 4'" in subject.command(wish, 1)
+    again = clvol.volume_scene(
+        str(tmp_path / "v.npy"), transfer={"opacity": [(0, 0), (1, 9)], "colour": [(0, 0.5), (1, 0.9)]}
+    )
+    assign(again, subject.assignments(wish))
+    assert parameters_of(again, "volume.interior_medium.opacity") == [(0.25, 0), (0.5, 4)]
+    with pytest.raises(clvol.SceneError, match="must not fall"):
+        subject.turn(Wish.of({"opacity": [[0.5, 0], [0.25, 4]]}))
 
 
 def parameters_of(scene: clvol.Scene, name: str) -> Any:

@@ -15,7 +15,7 @@ function turned(v, axis, angle) {  // Rodrigues
 }
 
 let scene = null, camera = null, socket = null, due = false;
-const wish = {camera: null, density: 1, glow: 1, anisotropy: null, azimuth: null, elevation: null, turn: 0,
+const wish = {camera: null, density: 1, glow: 1, anisotropy: null, azimuth: null, elevation: null, turn: 0, opacity: null,
               technique: "auto", transmittance: "auto", denoise: false, exposure: 0};
 const KNOBS = {  // what a slider's place means, and how it is written
   exposure: [(x) => x, (x) => `${x > 0 ? "+" : ""}${x.toFixed(1)} stops`],
@@ -164,6 +164,92 @@ at("copy").addEventListener("click", async () => {
   setTimeout(() => { at("copy").textContent = "Copy the command"; }, 1500);
 });
 
+// ---- the transfer function: a curve whose points are dragged
+
+const curve = at("curve"), EDGE = 8, GRIP = 12;
+let points = null, plane = null, held = null;
+
+function within(point) {  // where a point is on the curve's canvas
+  const share = (point[0] - plane.low) / (plane.high - plane.low);
+  return [EDGE + share * (curve.width - 2 * EDGE), curve.height - EDGE - point[1] / plane.most * (curve.height - 2 * EDGE)];
+}
+
+function pointed(event) {  // the value and the opacity that are pointed at
+  const box = curve.getBoundingClientRect();
+  const x = (event.clientX - box.x) / box.width * curve.width, y = (event.clientY - box.y) / box.height * curve.height;
+  const share = (x - EDGE) / (curve.width - 2 * EDGE), up = (curve.height - EDGE - y) / (curve.height - 2 * EDGE);
+  const near = points.findIndex((point) => Math.hypot(...add(within(point), [x, y], -1)) < GRIP);
+  const level = Math.min(Math.max(up, 0), 1) * plane.most;
+  return {near, point: [plane.low + Math.min(Math.max(share, 0), 1) * (plane.high - plane.low), level]};
+}
+
+function draw() {
+  const ink = curve.getContext("2d"), last = points.length - 1, bottom = curve.height - EDGE;
+  const path = [[0, within(points[0])[1]], ...points.map(within), [curve.width, within(points[last])[1]]];
+  ink.clearRect(0, 0, curve.width, curve.height);
+  const fill = ink.createLinearGradient(within([plane.first, 0])[0], 0, within([plane.last, 0])[0], 0);
+  scene.colours.forEach((colour, n) => {
+    fill.addColorStop(n / (scene.colours.length - 1), `color(srgb-linear ${colour.join(" ")} / 0.75)`);
+  });
+  ink.fillStyle = scene.colours.length ? fill : "#98a1b0";
+  ink.beginPath();
+  ink.moveTo(0, bottom);
+  for (const place of path) ink.lineTo(...place);
+  ink.lineTo(curve.width, bottom);
+  ink.fill();
+  ink.strokeStyle = "#e4e7ec";
+  ink.beginPath();
+  for (const place of path) ink.lineTo(...place);
+  ink.stroke();
+  for (const [n, point] of points.entries()) {
+    ink.beginPath();
+    ink.arc(...within(point), 4.5, 0, 2 * Math.PI);
+    ink.fillStyle = n === held ? "#ff9d4d" : "#e4e7ec";
+    ink.fill();
+  }
+  const shown = points[held];
+  at("transfer").querySelector("output").textContent =
+    shown ? `${Number(shown[0].toPrecision(4))}: ${Number(shown[1].toPrecision(3))}` : "";
+}
+
+function start(first) {
+  points = first.map((point) => [...point]);
+  const [low, high] = [points[0][0], points[points.length - 1][0]], margin = 0.08 * (high - low || 1);
+  const most = 1.3 * Math.max(...points.map((point) => point[1])) || 1;
+  plane = {first: low, last: high, low: low - margin, high: high + margin, most};
+  draw();
+}
+
+function bend() {
+  wish.opacity = points.map((point) => [...point]);
+  draw();
+  send();
+}
+
+curve.addEventListener("pointerdown", (event) => {
+  const {near} = pointed(event);
+  held = near < 0 ? null : near;
+  curve.setPointerCapture(event.pointerId);
+  draw();
+});
+curve.addEventListener("pointermove", (event) => {
+  if (held === null || !event.buttons) return;
+  const {point} = pointed(event);
+  const before = held ? points[held - 1][0] : -Infinity, after = held < points.length - 1 ? points[held + 1][0] : Infinity;
+  points[held] = [Math.min(Math.max(point[0], before), after), point[1]];
+  bend();
+});
+curve.addEventListener("dblclick", (event) => {
+  const {near, point} = pointed(event);
+  if (near >= 0 && points.length > 2) points.splice(near, 1);
+  else if (near < 0) {
+    const next = points.findIndex((one) => one[0] > point[0]);
+    points.splice(next < 0 ? points.length : next, 0, point);
+  }
+  held = null;
+  bend();
+});
+
 // ---- methods side by side, on what is seen now
 
 const methods = new Map();
@@ -224,9 +310,10 @@ function meet(said) {
   canvas.style.setProperty("--width", said.size[0]);
   canvas.style.setProperty("--height", said.size[1]);
   const there = {sun: !!said.sun, environment: said.environment, light: !!said.sun || said.environment};
-  for (const knob of ["density", "anisotropy", "glow"]) there[knob] = said.knobs.includes(knob);
+  for (const knob of ["density", "anisotropy", "glow", "opacity"]) there[knob] = said.knobs.includes(knob);
   for (const part of document.querySelectorAll("[data-for]")) part.hidden = !there[part.dataset.for];
   if (!camera) begin(said.first);
+  if (said.opacity && !points) start(said.opacity);
   const places = {anisotropy: said.anisotropy, azimuth: said.sun && said.sun[0], elevation: said.sun && said.sun[1]};
   for (const [knob, place] of Object.entries(places)) {
     if (place === undefined || place === null || wish[knob] !== null) continue;
