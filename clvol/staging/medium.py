@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clvol.errors import VolumeError
+from clvol.errors import OptionError, VolumeError
 from clvol.scene.reader import ROUNDING
 from clvol.scene.records import ConstVolume, GridVolume
 from clvol.staging.finding import IN_UNITS, Found, find_grids, plain
@@ -66,6 +66,9 @@ class Grids:
         others = (found.temperature, found.flame, found.colour)
         density = fields[found.density].seen_as(options.transfer or scanned(fields[found.density]))
         grids = cls(found, density, *(None if n is None else fields[n] for n in others))
+        if density.look is not None:
+            _refuse_beside(density.look, options)
+            return replace(grids.dark(), colour=None)
         grids.check(source.name)
         return grids.dark() if options.emission_scale == 0 else grids.lit()
 
@@ -206,6 +209,16 @@ def medium(grids: Grids, options: SimpleNamespace, scales: Scales) -> dict[str, 
         if scales.coldest:
             described["temperature_offset"] = scales.coldest
     return described
+
+
+def _refuse_beside(look: Look, options: SimpleNamespace) -> None:
+    """OptionError for what has no effect where a transfer function makes all of the medium of one grid."""
+    names = ["temperature", "flame", "colour", "albedo", "temperature_scale"]
+    names += [] if look.emission else ["emission_scale"]
+    for name in names:
+        if getattr(options, name) not in (None, "none"):
+            hint = "leave one of them out; a transfer's own colour and emission say how values look"
+            raise OptionError(f"a transfer function and {name} exclude each other", hint=hint)
 
 
 def scanned(density: Field) -> Look | None:

@@ -120,6 +120,14 @@ def test_what_is_no_transfer_function_is_said(given: dict[str, Any], says: str) 
             clvol.volume_scene(scan(), transfer=given)
 
 
+@pytest.mark.parametrize("other", [{"albedo": 0.5}, {"temperature": "heat"}, {"emission_scale": 2.0}])
+def test_what_a_transfer_function_decides_cannot_be_given_too(other: dict[str, Any]) -> None:
+    volume = {"density": scan(), "heat": np.abs(scan())}
+    with pytest.raises(clvol.OptionError, match="exclude each other"):
+        clvol.volume_scene(volume, transfer="bone", **other)
+    assert not medium_of(clvol.volume_scene(volume, transfer="bone", **SMALL)).emits
+
+
 @pytest.fixture(scope="module")
 def shown() -> clvol.Result:
     return clvol.show(placed(), transfer="bone", view="front", size=(40, 32), spp=4)
