@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _NOTHING = Boundaries((), (), ())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Plan(Decisions):
     """What is done for a scene with a user's choices; equal plans compile the same.
 
@@ -126,6 +126,10 @@ class Plan(Decisions):
     def describe(self) -> list[str]:
         """The plan in lines of text: choices with their reasons, features, stages, what is compiled."""
         return list(describe_plan(self))
+
+    def __repr__(self) -> str:
+        used = [f"{family} {name}" for family, name in self.in_force.items() if name != "none"]
+        return f"<Plan {', '.join(used)}>"
 
     def __str__(self) -> str:
         return "\n".join(self.describe())

@@ -72,7 +72,16 @@ class SceneParameters(MutableMapping[str, Any]):
         self._read()
 
     def _read(self) -> None:
-        self._found: dict[str, Parameter] = parameters_of(self.scene)
+        self._known: dict[str, Parameter] = parameters_of(self.scene)
+        self._read_from = tuple(getattr(self.scene, field) for field in _SCENE_FIELDS)
+
+    @property
+    def _found(self) -> dict[str, Parameter]:
+        """The scene's parameters as it is now: others may have traversed and changed it."""
+        now = tuple(getattr(self.scene, field) for field in _SCENE_FIELDS)
+        if any(one is not other for one, other in zip(now, self._read_from, strict=True)):
+            self._read()
+        return self._known
 
     def __getitem__(self, name: str) -> Any:
         key = self._key(name)
@@ -139,7 +148,12 @@ class SceneParameters(MutableMapping[str, Any]):
         SceneError, VolumeError
             Values that do not go together; the scene and what was set are as they were.
         """
-        super().update(*values, **named)
+        try:
+            given = dict(*values, **named)
+        except (TypeError, ValueError):
+            raise OptionError(f"update takes a dict of values, not {shown(values)}") from None
+        for name, value in given.items():
+            self[name] = value
         changed = {n: v for n, v in self._set.items() if not _same(v, self._found[n].held)}
         made: dict[int, tuple[object, Any]] = {}
         for name, value in changed.items():

@@ -178,6 +178,16 @@ def test_shared_media_stay_shared():
     assert len(media) == 1
 
 
+def test_two_that_traverse_a_scene_see_each_other(scene):
+    one, two = clvol.traverse(scene), clvol.traverse(scene)
+    one.update({"sky.radiance.value": 0.1})
+    assert two["sky.radiance.value"] == 0.1
+    assert two.update({"sky.radiance.value": 0.2}) == ["sky.radiance.value"]
+    assert one["sky.radiance.value"] == 0.2 and scene.emitters[0].radiance == (0.2,)
+    with pytest.raises(clvol.OptionError, match="update takes a dict of values, not"):
+        one.update(3)
+
+
 def test_values_that_are_read_cannot_be_written_to(scene):
     parameters = clvol.traverse(scene)
     for name in ("sensor.to_world", "smoke.interior.sigma_t.data"):
