@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -184,3 +185,14 @@ def test_the_lines_of_the_documentation_run(tmp_path: Path, monkeypatch: pytest.
     exec(compile(text, str(DOCS), "exec"), names)
     assert isinstance(names["scene"].shapes[0].interior.sigma_t, GridVolume)
     assert {path.name for path in tmp_path.glob("*.png")} == {"from-100.png", "from-200.png", "from-400.png"}
+
+
+@pytest.mark.contract
+@pytest.mark.skipif("CLVOL_DATA" not in os.environ, reason="CLVOL_DATA names no folder of volumes")
+def test_the_wires_of_a_stent_are_seen() -> None:
+    """A scan in one line: its metal is brighter than the vessel and the bone round it are opaque."""
+    stent = Path(os.environ["CLVOL_DATA"]) / "stent.npz"
+    metal = {"opacity": [(1100, 0), (1400, 300)], "colour": 0.9}
+    result = clvol.show(stent, transfer=metal, view="front", size=(48, 72), spp=4, background="black")
+    seen = result.image.mean(axis=2)[12:60, 16:40] > 0.02
+    assert 0.02 < seen.mean() < 0.6
