@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from clvol.base.extras import need
 from clvol.errors import Error, OptionError
+from clvol.lab.combinations import unbiased
 from clvol.picture.denoising import need_denoiser
 from clvol.planning import registry
 from clvol.viewer.painter import Painter
@@ -212,6 +213,7 @@ class Server:
             "denoiser": _has_denoiser(),
             "name": name,
             "families": families,
+            "compared": list(unbiased("technique")),
             "first": first,
             **self.subject.described(),
         }
@@ -233,6 +235,7 @@ class Server:
             "noise": _finite(result.noise),
             "rate": _finite(painted.rate),
             "seconds": _finite(about["seconds"]),
+            "wished": painted.wish.technique,
             "technique": about["technique"],
             "transmittance": about["transmittance"],
             "seen": repr(painted.wish.seen),

@@ -46,4 +46,8 @@ def test_the_page_turns_and_changes_without_an_error(server: Any) -> None:
         assert sum(word.startswith("sensor.to_world=") for word in words) == 1
         assert tab.value("document.getElementById('error').hidden")
         assert tab.value("document.querySelectorAll('#methods tr').length") >= 1
+        tab.value("document.getElementById('compare').click()")
+        tab.until("document.getElementById('compare').textContent === 'Compare techniques'")
+        assert tab.value("document.querySelectorAll('#methods tr').length") >= 1
+        tab.value("document.getElementById('technique').value = 'auto'")
         assert tab.messages == []

@@ -3,7 +3,7 @@
 
 const at = (id) => document.getElementById(id);
 const canvas = at("picture"), paper = canvas.getContext("2d");
-const DEGREES = Math.PI / 180, STEEPEST = 0.5 * DEGREES, COMPARED_MS = 4000;
+const DEGREES = Math.PI / 180, STEEPEST = 0.5 * DEGREES, COMPARED = 3, PATIENCE_MS = 60000;
 const add = (a, b, s = 1) => a.map((x, i) => x + s * b[i]);
 const dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0);
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -253,6 +253,8 @@ curve.addEventListener("dblclick", (event) => {
 // ---- methods side by side, on what is seen now
 
 const methods = new Map();
+const pause = (ms) => new Promise((then) => setTimeout(then, ms));
+let latest = null, failed = false;  // what was said of the last picture; whether a wish could not be had
 let seen = "";
 
 function short(number) {
@@ -285,13 +287,19 @@ at("compare").addEventListener("click", async () => {
   const button = at("compare"), before = wish.technique;
   if (button.dataset.stop) { button.dataset.stop = "now"; return; }
   button.dataset.stop = "no";
-  const names = Object.keys(scene.families.technique);
+  const names = scene.compared;
+  const view = latest && latest.seen;
   for (const [number, name] of names.entries()) {
     button.textContent = `${name} (${number + 1} of ${names.length}): stop`;
     at("technique").value = wish.technique = name;
+    latest = null;
+    failed = false;
     send();
-    await new Promise((then) => setTimeout(then, COMPARED_MS));
-    if (button.dataset.stop === "now") break;
+    const end = Date.now() + PATIENCE_MS;  // kernels may have to be built
+    const tried = () => latest && latest.wished === name && !latest.coarse && latest.spp > 1
+      && (latest.seconds >= COMPARED || latest.is_last);
+    while (button.dataset.stop === "no" && !failed && Date.now() < end && !tried()) await pause(100);
+    if (button.dataset.stop === "now" || (latest && latest.seen !== view)) break;
   }
   delete button.dataset.stop;
   button.textContent = "Compare techniques";
@@ -356,6 +364,7 @@ async function show(said, data) {
   document.body.dataset.pictures = shown;
   document.body.dataset.coarse = said.coarse;
   at("error").hidden = true;
+  latest = said;
   at("command").textContent = said.command;
   const noise = said.noise === null ? "" : `, noise ${percent(said.noise)}`;
   const rate = `${short(said.rate)} samples/s`;
@@ -372,6 +381,7 @@ function receive(buffer) {
   const said = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
   if (said.kind === "scene") meet(said);
   else if (said.kind === "error") {
+    failed = true;
     at("error").textContent = said.text;
     at("error").hidden = false;
   } else {
