@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,14 +31,19 @@ class EqualTime:
         Root of the mean relative squared error, without that of the reference.
     error
         Error of each pixel, relative, float64 (height, width).
-    flip
-        FLIP error of each pixel, float32 (height, width); None where it is not installed.
+    truth
+        The reference's image.
     """
 
     render: Render
     relrmse: float
     error: np.ndarray
-    flip: np.ndarray | None
+    truth: np.ndarray
+
+    @cached_property
+    def flip(self) -> np.ndarray | None:
+        """FLIP error of each pixel, float32 (height, width); None where it is not installed."""
+        return flip_error(display(self.truth), display(self.render.image)) if has_flip() else None
 
     @property
     def mean_flip(self) -> float:
@@ -50,8 +56,7 @@ def equal_time(render: Render, reference: Reference, weight: np.ndarray) -> Equa
     difference = render.image.astype(np.float64) - reference.image
     square = float(((difference**2 - reference.variance) * weight).mean())
     error = np.sqrt((difference**2).mean(axis=-1)) / level(reference.image)
-    flip = flip_error(display(reference.image), display(render.image)) if has_flip() else None
-    return EqualTime(render, math.sqrt(max(square, 0.0)), error, flip)
+    return EqualTime(render, math.sqrt(max(square, 0.0)), error, reference.image)
 
 
 def display(image: np.ndarray) -> np.ndarray:
