@@ -93,6 +93,7 @@ def view(
     seen. Ctrl-C ends it.
     """
     from clvol.base.progress import error_console
+    from clvol.device.device import open_device
     from clvol.viewer.server import Server
     from clvol.viewer.subject import Subject
     from clvol.viewer.wish import Wish
@@ -103,6 +104,7 @@ def view(
     asked = Asked.taken(scene, options, definitions)
     sensor = options.pop("sensor")
     with logging_to(error_console(), verbose=False), interruptible(ENDING) as interrupt:
+        open_device(options["device"])
         loaded, lines = asked.open(size)
         subject = Subject(loaded, words, sensor or 0, size or _fitting(loaded, sensor))
         server = Server(subject, options, spp, host, port, first)
@@ -119,13 +121,13 @@ def view(
             server.close()
 
 
-def _fitting(scene: Any, sensor: int | None) -> tuple[int, int] | None:
-    """The size of the film, smaller where it is large; None: as it is."""
+def _fitting(scene: Any, sensor: int | None) -> tuple[int, int]:
+    """The size of the film, smaller where it is large."""
     from clvol.scene.views import viewed
 
     width, height = viewed(scene, sensor).film.window[2:]
     if max(width, height) <= LARGEST:
-        return None
+        return width, height
     factor = LARGEST / max(width, height)
     return max(round(width * factor), 1), max(round(height * factor), 1)
 

@@ -60,6 +60,11 @@ class Painter:
     options : of `clvol.render`, for all pictures.
     show : takes each picture, in the thread that renders.
     fail : takes what was wrong with a wish.
+    first : what is wished for at first, once it is started.
+
+    Raises
+    ------
+    OptionError, SceneError : options that won't do, or that the scene cannot have.
     """
 
     def __init__(
@@ -69,6 +74,7 @@ class Painter:
         spp: int,
         show: Callable[[Painted], None],
         fail: Callable[[Exception], None],
+        first: Wish,
     ) -> None:
         self.subject, self.options, self.spp = subject, options, spp
         self.latest: Painted | None = None
@@ -81,7 +87,11 @@ class Painter:
         self._rate = math.nan
         self._clean_due = 0.0
         self._news = threading.Condition()
+        self._ordered(first, subject.size, spp)
         self._thread = threading.Thread(target=self._work, name="clvol painter", daemon=True)
+
+    def start(self) -> None:
+        """Begin to paint what is wished for."""
         self._thread.start()
 
     def want(self, wish: Wish) -> None:
@@ -99,7 +109,8 @@ class Painter:
             if self._frames is not None:
                 self._frames.cancel()
             self._news.notify()
-        self._thread.join()
+        if self._thread.ident is not None:
+            self._thread.join()
 
     def _work(self) -> None:
         while (wish := self._next()) is not None:
@@ -124,7 +135,6 @@ class Painter:
         self._clean_due = 0.0
         for size in self._coarse_sizes():
             self._render(wish, size, 1, coarse=True)
-        assert self.subject.size is not None
         self._render(wish, self.subject.size, self.spp, coarse=False)
 
     def _render(self, wish: Wish, size: tuple[int, int], spp: int, coarse: bool) -> None:
@@ -132,9 +142,7 @@ class Painter:
         with self._news:
             if self._outdated(wish):
                 return
-            chosen = {name: getattr(wish, name) for name in ("technique", "transmittance")}
-            options = {**self.options, **chosen, "sensor": self.subject.sensor, "size": size, "spp": spp}
-            self._frames = frames = progressive(self.subject.scene, **options)
+            self._frames = frames = self._ordered(wish, size, spp)
         try:
             for frame in frames:
                 with self._news:
@@ -147,6 +155,12 @@ class Painter:
             with self._news:
                 self._frames = None
             frames.close()
+
+    def _ordered(self, wish: Wish, size: tuple[int, int], spp: int) -> Frames:
+        """A render that is checked, and not yet begun."""
+        chosen = {name: getattr(wish, name) for name in ("technique", "transmittance")}
+        options = {**self.options, **chosen, "sensor": self.subject.sensor, "size": size, "spp": spp}
+        return progressive(self.subject.scene, **options)
 
     def _outdated(self, wish: Wish) -> bool:
         return self._closed or self._wish is None or self._wish.rendered != wish.rendered
@@ -172,7 +186,6 @@ class Painter:
 
     def _coarse_sizes(self) -> Iterator[tuple[int, int]]:
         """At first what takes no longer than a picture in motion may, then twice as wide, and so on."""
-        assert self.subject.size is not None
         width, height = self.subject.size
         most = self._rate * MOVING_SECONDS if math.isfinite(self._rate) else 0.0
         fitting = (divisor for divisor in COARSER if width * height <= most * divisor**2)

@@ -79,11 +79,11 @@ class Server:
             need_denoiser()
         self.subject, self.first = subject, first or Wish()
         self.token = secrets.token_urlsafe(24)
-        self._socket = _listening(host, port)
         self._host = host
         self._audience: set[asyncio.Queue[bytes]] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
-        self.painter = Painter(subject, options, spp, self._show, self._fail)
+        self.painter = Painter(subject, options, spp, self._show, self._fail, self.first)
+        self._socket = _listening(host, port)
         config = uvicorn.Config(
             _guarded(self._application(), self.token),
             log_level="critical",
@@ -105,6 +105,7 @@ class Server:
     def start(self) -> None:
         """Serve, in a thread."""
         self._thread.start()
+        self.painter.start()
         self.painter.want(self.first)
 
     def alive(self) -> bool:

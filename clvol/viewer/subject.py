@@ -42,18 +42,20 @@ class Subject:
     Parameters
     ----------
     words : the command line that renders it as it is, without the output.
-    sensor, size : which sensor sees it, and in how many pixels.
+    sensor, size : which sensor sees it, and in how many pixels; (0, 0): those of its film.
     """
 
     scene: Scene
     words: Sequence[str] = ("clvol", "render", "SCENE.xml")
     sensor: int = 0
-    size: tuple[int, int] | None = None
+    size: tuple[int, int] = (0, 0)
     _first: dict[str, Any] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
+        seen = viewed(self.scene, self.sensor)
+        if not any(self.size):
+            self.size = seen.film.window[2:]
         seen = viewed(self.scene, self.sensor, self.size)
-        self.size = seen.film.window[2:]
         self.parameters = traverse(self.scene)
         cameras = [name for name in self.parameters if name.endswith(".film.size")]
         self._camera = cameras[self.sensor].removesuffix("film.size") + "to_world"
@@ -142,7 +144,6 @@ class Subject:
 
     def command(self, wish: Wish, spp: int) -> str:
         """The command that renders the same picture."""
-        assert self.size is not None
         words = [*self.words, "-o", "view.png", "--size", "x".join(map(str, self.size)), "--spp", str(spp)]
         words += [] if wish.exposure == 0 else ["--exposure", _plain(wish.exposure)]
         words += ["--denoise"] if wish.denoise else []

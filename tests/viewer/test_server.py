@@ -280,9 +280,19 @@ def test_ctrl_c_ends_the_command() -> None:
     assert process.returncode == 0 and errors == ""
 
 
-@pytest.mark.parametrize(
-    "arguments", [("nothing.vdb",), (SLAB, "--sensor", "3"), (SLAB, "--host", "256.1.1.1")]
-)
+MISTAKES = [
+    ("nothing.vdb",),
+    (SLAB, "--sensor", "3"),
+    (SLAB, "--host", "256.1.1.1"),
+    (SLAB, "--device", "no such"),
+    (SLAB, "--spp", str(1 << 33)),
+    (SLAB, "--technique", "no such"),
+    (SLAB, "--exposure", "99"),
+    (SLAB, "--set", "sensor.film.crop_size=4,4"),
+]
+
+
+@pytest.mark.parametrize("arguments", MISTAKES)
 def test_mistakes_are_one_line(arguments: tuple[str, ...]) -> None:
     done = CliRunner().invoke(main, ["view", *arguments, "--no-browser"])
     assert done.exit_code == 2
