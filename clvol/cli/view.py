@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import webbrowser
-from typing import Any
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -20,6 +22,9 @@ from clvol.cli.options import (
 )
 from clvol.cli.pictures import Stops
 from clvol.cli.volumes import Asked, Background, spelled, volume_options, write_looks
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 EXAMPLES = """
 \b
@@ -103,7 +108,7 @@ def view(
     words = _words(scene, definitions, options)
     asked = Asked.taken(scene, options, definitions)
     sensor = options.pop("sensor")
-    with logging_to(error_console(), verbose=False), interruptible(ENDING) as interrupt:
+    with logging_to(error_console(), verbose=False), _said_once(), interruptible(ENDING) as interrupt:
         open_device(options["device"])
         loaded, lines = asked.open(size)
         subject = Subject(loaded, words, sensor or 0, size or _fitting(loaded, sensor))
@@ -119,6 +124,24 @@ def view(
                 ended.wait(_WAIT)
         finally:
             server.close()
+
+
+@contextmanager
+def _said_once() -> Iterator[None]:
+    """Warnings of a scene, which is rendered again and again, are logged once."""
+    said: set[str] = set()
+
+    def is_new(record: logging.LogRecord) -> bool:
+        known = record.getMessage() in said
+        said.add(record.getMessage())
+        return not known
+
+    logger = logging.getLogger("clvol")
+    logger.addFilter(is_new)
+    try:
+        yield
+    finally:
+        logger.removeFilter(is_new)
 
 
 def _fitting(scene: Any, sensor: int | None) -> tuple[int, int]:

@@ -44,6 +44,8 @@ _LONGEST = 1 << 16
 """Bytes of a wish at most."""
 _GRACE = 2
 """Seconds that connections have to end."""
+_PATIENCE, _GLANCE = 60.0, 0.05
+"""Seconds that who saves a picture waits for one that is not coarse, and after which it looks again."""
 LOOPBACK = "127.0.0.1"
 
 
@@ -146,11 +148,14 @@ class Server:
         """The picture as it is now, as a file."""
         from starlette.responses import PlainTextResponse, Response
 
-        kind, painted = request.path_params["kind"], self.painter.latest
+        kind = request.path_params["kind"]
         if kind not in _PICTURES:
             return PlainTextResponse("no such picture", 404, headers=_HEADERS)
-        if painted is None:
-            return PlainTextResponse("there is no picture yet", 503, headers=_HEADERS)
+        end = asyncio.get_running_loop().time() + _PATIENCE
+        while (painted := self.painter.latest) is None or painted.coarse:
+            if self._server.should_exit or asyncio.get_running_loop().time() > end:
+                return PlainTextResponse("there is no picture yet", 503, headers=_HEADERS)
+            await asyncio.sleep(_GLANCE)
         data = await asyncio.to_thread(self._file_of, painted, f".{kind}")
         headers = {**_HEADERS, "Content-Disposition": f'attachment; filename="view.{kind}"'}
         return Response(data, media_type=_PICTURES[kind], headers=headers)

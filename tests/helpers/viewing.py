@@ -56,12 +56,12 @@ def page_of(server: Any, path: str = "live") -> Iterator[Page]:
         yield Page(connection)
 
 
-def serving(spp: int) -> Any:
-    """A server of the slab, in 16 x 16 pixels."""
+def serving(spp: int, size: tuple[int, int] = (16, 16)) -> Any:
+    """A server of the slab."""
     from clvol.viewer.server import Server
     from clvol.viewer.subject import Subject
 
     words = ["clvol", "render", SLAB]
-    server = Server(Subject(clvol.load_file(SLAB), words, size=(16, 16)), {}, spp)
+    server = Server(Subject(clvol.load_file(SLAB), words, size=size), {}, spp)
     server.start()
     return server

@@ -209,6 +209,17 @@ def test_a_new_wish_ends_the_render_of_the_old_one() -> None:
     assert not server.painter._thread.is_alive()
 
 
+def test_a_picture_that_is_saved_is_no_coarse_one() -> None:
+    server = serving(spp=1, size=(64, 48))
+    try:
+        for density in (1.0, 2.0):
+            server.painter.want(Wish(density=density))
+            with urlopen(server.address + "picture.png") as answer:
+                assert pixels(answer.read()).shape == (48, 64, 3)
+    finally:
+        server.close()
+
+
 def test_who_comes_later_sees_the_picture_there_is(server: Any) -> None:
     with page_of(server) as page:
         shown(server, page, {"density": 0.75})
@@ -269,7 +280,7 @@ def parameters_of(scene: clvol.Scene, name: str) -> Any:
 
 
 def test_ctrl_c_ends_the_command() -> None:
-    command = [sys.executable, "-m", "clvol", "view", SLAB, "-D", "res=16", "--no-browser"]
+    command = [sys.executable, "-m", "clvol", "view", SLAB, "--size", "64x64", "--no-browser"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout
     address = next(line for line in process.stdout if "http://127.0.0.1:" in line).split()[-1]
