@@ -16,6 +16,7 @@ from clvol.errors import Error, OptionError
 from clvol.lab.combinations import unbiased
 from clvol.picture.denoising import need_denoiser
 from clvol.planning import registry
+from clvol.viewer.access import HEADERS, LOOPBACK, guarded, listening
 from clvol.viewer.painter import Painter
 from clvol.viewer.wish import Wish
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
     from starlette.requests import Request
     from starlette.responses import Response
-    from starlette.types import ASGIApp, Receive, Scope, Send
+    from starlette.types import ASGIApp
     from starlette.websockets import WebSocket
 
     from clvol.viewer.painter import Painted
@@ -34,19 +35,12 @@ _PAGE = {"": "text/html", "viewer.js": "text/javascript", "viewer.css": "text/cs
 """Files of the page, and what they are."""
 _PICTURES = {"exr": "image/x-exr", "png": "image/png"}
 """What a picture can be saved as."""
-_HEADERS = {
-    "Cache-Control": "no-store",
-    "Content-Security-Policy": "default-src 'self'; img-src 'self' blob: data:; frame-ancestors 'none'",
-    "Referrer-Policy": "no-referrer",  # the address is a secret
-    "X-Content-Type-Options": "nosniff",
-}
 _LONGEST = 1 << 16
 """Bytes of a wish at most."""
 _GRACE = 2
 """Seconds that connections have to end."""
 _PATIENCE, _GLANCE = 60.0, 0.05
 """Seconds that who saves a picture waits for one that is not coarse, and after which it looks again."""
-LOOPBACK = "127.0.0.1"
 
 
 class Server:
@@ -85,9 +79,9 @@ class Server:
         self._audience: set[asyncio.Queue[bytes]] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
         self.painter = Painter(subject, options, spp, self._show, self._fail, self.first)
-        self._socket = _listening(host, port)
+        self._socket = listening(host, port)
         config = uvicorn.Config(
-            _guarded(self._application(), self.token),
+            guarded(self._application(), self.token),
             log_level="critical",
             access_log=False,
             lifespan="off",
@@ -142,7 +136,7 @@ class Server:
 
         name = request.url.path.rpartition("/")[2]
         data = (files("clvol.viewer") / "page" / (name or "index.html")).read_bytes()
-        return Response(data, media_type=_PAGE[name], headers=_HEADERS)
+        return Response(data, media_type=_PAGE[name], headers=HEADERS)
 
     async def _picture(self, request: Request) -> Response:
         """The picture as it is now, as a file."""
@@ -150,14 +144,14 @@ class Server:
 
         kind = request.path_params["kind"]
         if kind not in _PICTURES:
-            return PlainTextResponse("no such picture", 404, headers=_HEADERS)
+            return PlainTextResponse("no such picture", 404, headers=HEADERS)
         end = asyncio.get_running_loop().time() + _PATIENCE
         while (painted := self.painter.latest) is None or painted.coarse:
             if self._server.should_exit or asyncio.get_running_loop().time() > end:
-                return PlainTextResponse("there is no picture yet", 503, headers=_HEADERS)
+                return PlainTextResponse("there is no picture yet", 503, headers=HEADERS)
             await asyncio.sleep(_GLANCE)
         data = await asyncio.to_thread(self._file_of, painted, f".{kind}")
-        headers = {**_HEADERS, "Content-Disposition": f'attachment; filename="view.{kind}"'}
+        headers = {**HEADERS, "Content-Disposition": f'attachment; filename="view.{kind}"'}
         return Response(data, media_type=_PICTURES[kind], headers=headers)
 
     @staticmethod
@@ -290,37 +284,3 @@ def _message(said: dict[str, Any], picture: bytes = b"") -> bytes:
     """Length of what is said, that, and the picture."""
     words = json.dumps(said).encode()
     return struct.pack("<I", len(words)) + words + picture
-
-
-def _listening(host: str, port: int) -> socket.socket:
-    """OptionError where that cannot be."""
-    try:
-        family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
-        return socket.create_server((host, port), family=family)
-    except (OSError, OverflowError) as error:
-        raise OptionError(
-            f"cannot listen on {host}, port {port}: {error}", hint="choose another --port"
-        ) from None
-
-
-def _guarded(application: ASGIApp, token: str) -> ASGIApp:
-    """The application under the token, as a folder; everything else is not there."""
-
-    async def guarded(scope: Scope, receive: Receive, send: Send) -> None:
-        first, slash, rest = scope["path"].lstrip("/").partition("/")
-        if not (slash and secrets.compare_digest(first.encode(), token.encode())):
-            await _refused(scope, receive, send)
-            return
-        await application({**scope, "path": f"/{rest}", "root_path": ""}, receive, send)
-
-    return guarded
-
-
-async def _refused(scope: Scope, receive: Receive, send: Send) -> None:
-    from starlette.responses import PlainTextResponse
-    from starlette.websockets import WebSocketClose
-
-    if scope["type"] == "websocket":
-        await WebSocketClose(code=1008)(scope, receive, send)
-    else:
-        await PlainTextResponse("not found", 404)(scope, receive, send)
