@@ -95,7 +95,7 @@ def _check_same_render(one: Result, other: Result) -> None:
     """Raise OptionError where the two are not samples of the same picture."""
     size = {"size": (one.image.shape[1::-1], other.image.shape[1::-1])}
     aovs = {"aovs": (sorted(one.aovs), sorted(other.aovs))}
-    for key, (ours, theirs) in (size | aovs | differences(one.metadata, other.metadata)).items():
+    for key, (ours, theirs) in (size | differences(one.metadata, other.metadata) | aovs).items():
         if ours != theirs:
             raise OptionError(
                 f"cannot merge results of a different {key}: {ours!r} and {theirs!r}",

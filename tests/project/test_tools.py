@@ -290,13 +290,20 @@ def test_all_runs_every_part_in_order_and_hands_mitsuba_on(tool, monkeypatch: py
     docs, done = tool("docs"), []
     monkeypatch.setattr(docs, "enclosed", lambda path: ("", ""))
     monkeypatch.setattr(tool("benchmarks.cloud"), "has_mitsuba", lambda python: True)
-    for part in (docs.pictures, docs.profile, docs.techniques, docs.pilot, docs.performance):
+    for part in (docs.pictures, docs.profile, docs.techniques, docs.pilot, docs.recipes, docs.performance):
         status = 1 if part is docs.pilot else None
         note = lambda *_, part=part, status=status, **options: done.append((part.name, options)) or status  # noqa: E731
         monkeypatch.setattr(part, "callback", note)
     outcome = CliRunner().invoke(docs.main, ["all", "--mitsuba", "their/python"])
     assert outcome.exit_code == 1, outcome.output
-    assert [name for name, _ in done] == ["pictures", "profile", "techniques", "pilot", "performance"]
+    assert [name for name, _ in done] == [
+        "pictures",
+        "profile",
+        "techniques",
+        "pilot",
+        "recipes",
+        "performance",
+    ]
     assert done[-1][1]["mitsuba"] == "their/python" and done[-1][1]["output"] == docs.PERFORMANCE
 
 

@@ -120,7 +120,7 @@ def test_a_vol_is_not_written_with_masked_samples(tmp_path):
 
 @pytest.mark.parametrize(
     ("shape", "advice"),
-    [((5, 8, 8, 8), "give one array [z, y, x] at a time"), ((3, 8, 8, 8), "numpy.moveaxis(array, 0, -1)")],
+    [((5, 8, 8, 8), "give one time of it, as array[0]"), ((3, 8, 8, 8), "numpy.moveaxis(array, 0, -1)")],
 )
 def test_four_axes_that_are_no_channels_are_told_by_their_shape(shape, advice):
     with pytest.raises(VolumeError) as caught:

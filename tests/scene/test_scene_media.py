@@ -14,6 +14,7 @@ from clvol.scene.digest import scene_digest
 from clvol.scene.medium_facts import medium_volumes
 from clvol.scene.phase import MAX_LOBES
 from clvol.scene.records import BlendPhase, ConstVolume, Film, GridVolume, Medium, Phase
+from clvol.volumes.transfer import Transfer, Transfers
 
 DENSITY = np.random.default_rng(3).uniform(0, 2, (4, 3, 2))
 COLOURED = DENSITY[..., None] * np.array([0.5, 1.0, 0.25])
@@ -352,6 +353,7 @@ def test_the_digest_depends_on_every_field_of_a_medium():
         "emission_scale": 2.0,
         "temperature_scale": 2.0,
         "temperature_offset": 2.0,
+        "transfers": Transfers(sigma_t=Transfer(np.arange(2, dtype=np.float32), np.ones((2, 3), np.float32))),
     }
     assert {f.name for f in fields(Medium)} == {"name", *other}
     digests = {scene_digest(base)}

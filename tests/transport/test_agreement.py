@@ -118,8 +118,8 @@ def test_a_bias_of_one_tile_is_rejected():
 def test_a_majorant_ten_percent_too_low_is_caught_by_count_and_by_picture(majorant, monkeypatch):
     reference()  # before anything is broken
 
-    def lowered(minimum, maximum, cell_size, mean=None):
-        bounds = with_slack(minimum, maximum, cell_size, mean)
+    def lowered(minimum, maximum, cell_size, *others):
+        bounds = with_slack(minimum, maximum, cell_size, *others)
         return replace(bounds, maximum=bounds.maximum * np.float32(0.9))
 
     monkeypatch.setattr("clvol.tables.majorants.with_slack", lowered)

@@ -146,6 +146,7 @@ def test_the_scenes_have_every_plugin_that_both_programs_know():
     used = set(re.findall(r'(?:type|name="integrator" value)="(\w+)"', text))
     used |= {value for _, defaults, *_ in PICTURES.values() for value in defaults.values()}
     assert {name for plugins in PLUGINS.values() for name in plugins} - used == {
+        "classified",
         "vdbvolume",
         "stl",
         "glb",
