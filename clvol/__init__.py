@@ -164,6 +164,10 @@ if not TYPE_CHECKING:  # who reads it looks the names up above, and finds those 
         globals()[name] = value
         return value
 
+    def __dir__() -> list[str]:
+        """The public names, which completion offers."""
+        return sorted({*__all__, *_EXPORTS})
+
 
 @contextmanager
 def _undisturbed() -> Iterator[None]:

@@ -52,7 +52,10 @@ class Interrupt:
         self._patience = patience
         for number in self.numbers if not self._previous else ():
             previous = signal.getsignal(number)
-            if previous not in (signal.SIG_IGN, None):
+            if previous is signal.SIG_IGN:
+                # a compiler of kernels catches it nevertheless, and then gives SIGTERM back its default
+                signal.signal(number, signal.SIG_IGN)
+            elif previous is not None:
                 self._previous[number] = previous
                 signal.signal(number, self._on_signal)
 

@@ -97,6 +97,7 @@ class Frames:
             )
             for number in numbers
         )
+        _check_distinct(made)
         whole = (asked.name,) if source is None else tuple(map(source.at, found)) if asked.is_volume else ()
         return cls(made, films, whole)
 
@@ -246,6 +247,14 @@ class Series:
         for film in self.frames.films:
             if os.path.exists(film):
                 yield f"{film}: the film"
+
+
+def _check_distinct(frames: Sequence[Frame]) -> None:
+    """Refuse pictures that would replace what is to be rendered, whatever the links to them."""
+    rendered = {os.path.realpath(frame.name) for frame in frames}
+    for output in (output for frame in frames for output in frame.outputs):
+        if os.path.realpath(output) in rendered:
+            raise click.UsageError(f"{output}: would replace a frame of the sequence")
 
 
 def check_series(options: dict[str, Any], shown: Shown, trace: str | None, frames: Frames) -> None:

@@ -31,7 +31,7 @@ from clvol.cli.volumes import Asked, Background, volume_options, write_looks
 from clvol.errors import Error
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from rich.console import Console
 
@@ -188,7 +188,8 @@ def render(
     overwrite, fps = options.pop("overwrite"), options.pop("fps")
     frames = Frames.of(asked, outputs, listed, turntable)
     first = outputs if frames is None else frames.first_outputs
-    _check_files(scene, first, trace, shown, bool(options["aov"]))
+    read = {scene: "the scene"} | ({asked.given["light"]: "the light"} if asked.given.get("light") else {})
+    _check_files(read, first, trace, shown, bool(options["aov"]))
     console, profiled = error_console(), options.pop("profile")
     options |= extent | {"profile": profiled or trace is not None}
     options["resume"] = _picture_to_go_on_from(outputs, frames is not None) if options["resume"] else None
@@ -308,7 +309,9 @@ def _check_room(loaded: Scene, outputs: Sequence[str], options: dict[str, Any]) 
         check_disk(output, math.prod(film.window[2:]), len(options["aov"]))
 
 
-def _check_files(scene: str, outputs: Sequence[str], trace: str | None, shown: Shown, aovs: bool) -> None:
+def _check_files(
+    read: Mapping[str, str], outputs: Sequence[str], trace: str | None, shown: Shown, aovs: bool
+) -> None:
     """Refuse what could not be written after a long render, and what nothing would be written of."""
     from clvol.picture.profile import check_trace
 
@@ -317,7 +320,7 @@ def _check_files(scene: str, outputs: Sequence[str], trace: str | None, shown: S
         raise click.UsageError("--aov needs an .exr to write to")
     if trace is not None:
         check_trace(trace)
-    _check_distinct(scene, outputs if trace is None else (*outputs, trace))
+    _check_distinct(read, outputs if trace is None else (*outputs, trace))
 
 
 def _save_trace(profile: Profile, path: str) -> dict[StrPath, Error]:
@@ -329,9 +332,9 @@ def _save_trace(profile: Profile, path: str) -> dict[StrPath, Error]:
     return {}
 
 
-def _check_distinct(scene: str, outputs: Sequence[str]) -> None:
-    """Refuse pictures that would replace each other or the scene, whatever the links to them."""
-    names = {os.path.realpath(scene): "the scene"}
+def _check_distinct(read: Mapping[str, str], outputs: Sequence[str]) -> None:
+    """Refuse pictures that would replace each other or what is `read`, whatever the links to them."""
+    names = {os.path.realpath(name): what for name, what in read.items()}
     for output in outputs:
         place = os.path.realpath(output)
         if place in names:

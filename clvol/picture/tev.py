@@ -55,7 +55,7 @@ class Tev:
         host, port = parse_address(address)
         try:
             self._socket: socket.socket | None = socket.create_connection((host, port), PATIENCE)
-        except OSError as error:
+        except (OSError, UnicodeError) as error:
             hint = "start tev first, or name its machine: --tev HOST:PORT"
             raise OptionError(f"nobody listens at {address} ({error})", "--tev", hint) from None
 

@@ -131,6 +131,28 @@ def test_before_the_first_sample_there_is_nothing_to_keep(
     assert (tmp_path / "a.exr").read_bytes() == b"earlier"
 
 
+IGNORED = """
+import os, signal
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+from clvol.base.progress import RichProgress
+from clvol.cli.main import main
+def pressed(bar, record):
+    os.kill(os.getpid(), signal.SIGINT)
+    os.kill(os.getpid(), signal.SIGTERM)
+RichProgress.__call__ = pressed
+main(["render", "s.xml", "-o", "a.exr", "--spp", "1000000"])
+"""
+
+
+def test_an_ignored_ctrl_c_takes_no_other_signal_with_it(tmp_path: Path) -> None:
+    """As a shell's background jobs ignore it; the compiler of kernels has caught it by the first sample."""
+    (tmp_path / "s.xml").write_text(SCENE)
+    command = [sys.executable, "-c", IGNORED]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 128 + signal.SIGTERM, done.stderr
+    assert "saved what there is" in done.stderr and samples_of(tmp_path / "a.exr") > 0
+
+
 def test_renders_in_python_leave_other_signals_to_the_program() -> None:
     seen = []
 

@@ -176,6 +176,19 @@ def test_frames_that_are_there_are_not_rendered_again(folder: Path) -> None:
         np.testing.assert_array_equal(again, before)
 
 
+def test_no_frame_replaces_what_is_rendered(folder: Path) -> None:
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    for path in before:
+        path.with_suffix(".tif").symlink_to(path)
+    outcome = run("render", "smoke.####.npz", "-o", "smoke.####.tif", "--overwrite")
+    assert outcome.exit_code == 2
+    assert "would replace a frame of the sequence" in outcome.stderr
+    (folder / "light.exr").write_bytes(b"an environment")
+    outcome = run("render", "smoke.0002.npz", "-o", "light.exr", "--light", "light.exr")
+    assert outcome.exit_code == 2 and "would replace the light" in outcome.stderr
+    assert {path: path.read_bytes() for path in before} == before
+
+
 def test_kernels_are_built_once(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from clvol.device import programs
 
