@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
+from click.core import ParameterSource
 
 from clvol.cli.frames import Frames, Series, check_series, frame_options
 from clvol.cli.messages import exit_by, logging_to, mention
@@ -187,6 +188,7 @@ def render(
     listed, turntable = options.pop("frames"), options.pop("turntable")
     overwrite, fps = options.pop("overwrite"), options.pop("fps")
     frames = Frames.of(asked, outputs, listed, turntable)
+    _check_used(frames, overwrite)
     first = outputs if frames is None else frames.first_outputs
     read = {scene: "the scene"} | ({asked.given["light"]: "the light"} if asked.given.get("light") else {})
     _check_files(read, first, trace, shown, bool(options["aov"]))
@@ -285,6 +287,17 @@ def _tev_at(address: str | None) -> AbstractContextManager[Tev | None]:
     from clvol.picture.tev import Tev
 
     return Tev(address)
+
+
+def _check_used(frames: Frames | None, overwrite: bool) -> None:
+    """Refuse options of sequences and films where there is none."""
+    given = click.get_current_context().get_parameter_source("fps") is not ParameterSource.DEFAULT
+    if given and not (frames and frames.films):
+        raise click.UsageError("--fps is for films, as -o smoke.mp4")
+    if overwrite and frames is None:
+        raise click.UsageError(
+            "--overwrite is for sequences and turntables: one picture is written anew anyway"
+        )
 
 
 def _picture_to_go_on_from(outputs: Sequence[str], series: bool) -> str | None:

@@ -227,7 +227,10 @@ def _warn(session: Session, stats: dict[str, Any]) -> None:
     """Log what leaves the picture wrong, or noisier than it looks."""
     features = session.plan.features
     if features.heterogeneous and not stats["lookups"] and not features.homogeneous:
-        log.warning("no path met any density: are the transforms right?")
+        tables = [table for table in session.prepared.majorants if table is not None]
+        dense = any(table.majorant.any() for table in tables)
+        why = "are the transforms right?" if dense else "it is 0 everywhere (a transfer function?)"
+        log.warning("no path met any density: %s", why)
     for name in ("non_finite", "walks_exhausted"):
         if stats[name]:
             log.warning("%s: %d", name.replace("_", " "), stats[name])

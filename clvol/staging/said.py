@@ -36,6 +36,18 @@ def said(
     summary = LOOKS[options.light].summary if options.light in LOOKS else "an environment"
     dimmed = ", dimmed for what glows" if options.light in LOOKS and fixed.burns else ""
     yield f"light    {options.light}: {summary}{dimmed}"
+    for option, why in _unused(options, fixed):
+        yield f"unused   {option}: {why}"
+
+
+def _unused(options: SimpleNamespace, fixed: Fixed) -> Iterator[tuple[str, str]]:
+    """What was given and changes nothing, and why."""
+    if options.sun_direction is not None and not (options.light in LOOKS and LOOKS[options.light].lamps):
+        yield "the sun's direction", f"light {options.light} has no lamp of its own"
+    if options.temperature_scale is not None and not fixed.burns:
+        yield "the temperature's scale", "nothing glows"
+    if options.emission_scale and not fixed.burns:
+        yield "the emission's scale", "nothing glows"
 
 
 def _density(grids: Grids, options: SimpleNamespace, rays: Rays, scale: float) -> str:

@@ -267,6 +267,8 @@ def test_scenes_may_be_a_sequence_too(folder: Path) -> None:
         (["smoke.####.npz", "-o", "out.####.png", "--exposure", "auto"], "differs from frame to frame"),
         (["smoke.####.npz", "-o", "out.####.png", "--profile"], "for one picture"),
         (["smoke.####.npz", "-o", "out.####.gif"], "out.0001.gif"),
+        (["smoke.####.npz", "-o", "out.####.png", "--fps", "12"], "--fps is for films"),
+        (["smoke.0002.npz", "-o", "out.png", "--overwrite"], "--overwrite is for sequences"),
     ],
 )
 def test_mistakes_are_one_line(folder: Path, arguments: list[str], fragment: str) -> None:

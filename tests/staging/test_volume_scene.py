@@ -220,6 +220,25 @@ def test_the_sun_stands_where_it_is_told_to() -> None:
     np.testing.assert_allclose(scene.emitters[1].direction, [0, -0.6, -0.8])
 
 
+@pytest.mark.parametrize(
+    ("given", "unused"),
+    [
+        ({"light": "sky", "sun_direction": (0, 3, 4)}, "unused   the sun's direction"),
+        ({"temperature_scale": 100.0}, "unused   the temperature's scale: nothing glows"),
+        ({"emission_scale": 5.0}, "unused   the emission's scale: nothing glows"),
+    ],
+)
+def test_what_changes_nothing_is_said(given: dict[str, object], unused: str) -> None:
+    assert any(line.startswith(unused) for line in stage(Source.of(ball()), given).lines)
+    assert not any(line.startswith("unused") for line in stage(Source.of(ball()), {}).lines)
+
+
+def test_a_density_of_0_is_told_from_one_that_is_not_met(caplog: pytest.LogCaptureFixture) -> None:
+    scene = clvol.volume_scene(ball(), transfer={"opacity": [(100, 0), (200, 2)]})
+    clvol.render(scene, spp=1, size=(8, 8))
+    assert "no path met any density: it is 0 everywhere" in caplog.text
+
+
 def test_what_is_behind_has_any_colour_or_none() -> None:
     film = clvol.volume_scene(ball(), background="#ff8000").film
     np.testing.assert_allclose(film.backdrop, [1, 0.2158605, 0], atol=1e-6)
