@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from clvol.cli.messages import mention
-from clvol.cli.options import quiet_option
+from clvol.cli.options import outputs_option, quiet_option
 from clvol.cli.pictures import Shown, picture_options, write_views
 
 EXAMPLES = """
@@ -30,14 +30,8 @@ class MergeCommand(click.Command):
 
 @click.command(cls=MergeCommand, epilog=EXAMPLES)
 @click.argument("pictures", metavar="PICTURE…", nargs=-1, required=True)
-@click.option(
-    "-o",
-    "--output",
-    "outputs",
-    metavar="FILE",
-    multiple=True,
-    required=True,
-    help="Picture to write, as of clvol render; may be given several times, and be one of the pictures.",
+@outputs_option(
+    "Picture to write, as of clvol render; may be given several times, and be one of the pictures.",
 )
 @picture_options
 @quiet_option

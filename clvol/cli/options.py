@@ -141,6 +141,13 @@ def finite(ctx: click.Context, param: click.Parameter, value: float | None) -> f
     return value
 
 
+def outputs_option(help_text: str, required: bool = True) -> Callable[[F], F]:
+    """-o FILE, any number of times, at least once where `required`."""
+    return click.option(
+        "-o", "--output", "outputs", metavar="FILE", multiple=True, required=required, help=help_text
+    )
+
+
 def positive_option(*names: str, **settings: Any) -> Callable[[F], F]:
     """An option that takes a finite number above 0."""
     above_zero = click.FloatRange(min=0, min_open=True)

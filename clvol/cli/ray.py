@@ -15,6 +15,7 @@ from clvol.cli.options import (
     device_option,
     family_options,
     majorant_scale_option,
+    outputs_option,
     quiet_option,
     step_option,
 )
@@ -41,13 +42,9 @@ watched one by one."""
 @click.argument("scene", metavar="SCENE")
 @click.argument("x", type=int, metavar="X")
 @click.argument("y", type=int, metavar="Y")
-@click.option(
-    "-o",
-    "--output",
-    "outputs",
-    metavar="FILE",
-    multiple=True,
-    help="Figure to write, .png, .svg or .pdf, or the numbers, .json; ray.png by default.",
+@outputs_option(
+    "Figure to write, .png, .svg or .pdf, or the numbers, .json; ray.png by default.",
+    required=False,
 )
 @click.option(
     "--techniques",

@@ -22,6 +22,7 @@ from clvol.cli.options import (
     device_option,
     family_options,
     majorant_scale_option,
+    outputs_option,
     positive_option,
     quiet_option,
     step_option,
@@ -82,14 +83,8 @@ class RenderCommand(ExplainedCommand):
 
 @click.command(cls=RenderCommand, epilog=EXAMPLES)
 @click.argument("scene", metavar="SCENE")
-@click.option(
-    "-o",
-    "--output",
-    "outputs",
-    metavar="FILE",
-    multiple=True,
-    required=True,
-    help="Picture to write: .exr has everything; .png, .jpg, .tif, .hdr and others the picture. "
+@outputs_option(
+    "Picture to write: .exr has everything; .png, .jpg, .tif, .hdr and others the picture. "
     "May be given several times.",
 )
 @volume_options

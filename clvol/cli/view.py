@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import logging
 import threading
 import webbrowser
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -24,7 +22,8 @@ from clvol.cli.pictures import Stops
 from clvol.cli.volumes import Asked, Background, spelled, volume_options, write_looks
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    import logging
+    from contextlib import AbstractContextManager
 
 EXAMPLES = """
 \b
@@ -126,9 +125,10 @@ def view(
             server.close()
 
 
-@contextmanager
-def _said_once() -> Iterator[None]:
+def _said_once() -> AbstractContextManager[None]:
     """Warnings of a scene, which is rendered again and again, are logged once."""
+    from clvol.lab.quiet import log_filter
+
     said: set[str] = set()
 
     def is_new(record: logging.LogRecord) -> bool:
@@ -136,12 +136,7 @@ def _said_once() -> Iterator[None]:
         said.add(record.getMessage())
         return not known
 
-    logger = logging.getLogger("clvol")
-    logger.addFilter(is_new)
-    try:
-        yield
-    finally:
-        logger.removeFilter(is_new)
+    return log_filter(is_new)
 
 
 def _fitting(scene: Any, sensor: int | None) -> tuple[int, int]:
