@@ -1,10 +1,14 @@
-"""Opening the files that users name: regular files only, so that no pipe, socket or device is waited for."""
+"""Opening the files that users name: regular files only, so that no pipe, socket or device is waited for.
+
+What is read for a scene is noted on the way, so that no picture replaces it.
+"""
 
 from __future__ import annotations
 
 import os
 import stat
 from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -36,6 +40,29 @@ def _kind(mode: int) -> str:
     return "" if stat.S_ISREG(mode) else _KINDS.get(stat.S_IFMT(mode), "not a regular file")
 
 
+_NOTED: ContextVar[dict[str, None] | None] = ContextVar("files that are read", default=None)
+
+
+@contextmanager
+def files_noted() -> Iterator[dict[str, None]]:
+    """The names of all files that are read within the block, in their order."""
+    outer, noted = _NOTED.get(), dict[str, None]()
+    token = _NOTED.set(noted)
+    try:
+        yield noted
+    finally:
+        _NOTED.reset(token)
+        if outer is not None:
+            outer.update(noted)
+
+
+def note_file(path: str | os.PathLike[str]) -> None:
+    """Note that a file is read, where `open_regular` does not see it, as by another library."""
+    noted = _NOTED.get()
+    if noted is not None:
+        noted[os.fspath(path)] = None
+
+
 @contextmanager
 def open_regular(path: str | os.PathLike[str], error: type[Error], noun: str) -> Iterator[BufferedReader]:
     """Open a regular file for reading bytes, and see to it that it does not change until it is closed.
@@ -54,6 +81,7 @@ def open_regular(path: str | os.PathLike[str], error: type[Error], noun: str) ->
         raise error("no such file", str(path)) from None
     except (OSError, ValueError) as reason:
         raise error(f"cannot be opened ({reason})", str(path)) from None
+    note_file(path)
     with file:
         before = os.fstat(file.fileno())
         if _kind(before.st_mode):  # put in its place since

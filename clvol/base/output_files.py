@@ -21,7 +21,7 @@ from clvol.base.memory import format_bytes
 from clvol.errors import OptionError, shown
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
 StrPath = str | PathLike[str]
 _NO_SYNC = (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP)
@@ -50,6 +50,13 @@ def check_file(path: StrPath) -> None:
     if target.exists() and not os.access(target, os.W_OK):
         raise OptionError("is write-protected", where, "give another name, or chmod it")
     check_room(target.parent, where)
+
+
+def check_spares(path: StrPath, read: Iterable[StrPath]) -> None:
+    """Raise OptionError where the file would take the place of one that was `read`, whatever the links."""
+    target = real(path)
+    if any(os.path.realpath(name) == str(target) for name in read):
+        raise OptionError("would replace a file of the scene", str(path), "give another name")
 
 
 def check_room(folder: Path, where: str, size: int = 0) -> None:

@@ -111,6 +111,7 @@ def compare(
         import clvol
 
         loaded = clvol.load_file(scene, **dict(definitions))
+        check_folder(output, loaded.files)
         progress: Any = False if quiet else Bar(console)
         comparison = _run(clvol.compare, loaded, progress, options)
         arguments = click.get_current_context().meta.get("clvol.arguments", [])

@@ -40,6 +40,7 @@ def merge(pictures: tuple[str, ...], outputs: tuple[str, ...], quiet: bool, **op
 
     They are of the same scene, seed and choices: parts that --samples rendered, on several machines.
     """
+    from clvol.base.output_files import check_spares
     from clvol.base.progress import format_noise
     from clvol.picture.loading import load_result
     from clvol.picture.merging import merge as merged
@@ -48,6 +49,8 @@ def merge(pictures: tuple[str, ...], outputs: tuple[str, ...], quiet: bool, **op
     shown = Shown.taken(options)
     shown.check(outputs)
     result = merged([load_result(picture) for picture in pictures])
+    for output in outputs:
+        check_spares(output, result.files)
     failures = save_all(shown.encoder(result), outputs)
     if not quiet:
         written = ", ".join(output for output in outputs if output not in failures) or "not saved"

@@ -83,12 +83,15 @@ def ray(
     functions, in the first medium that the ray enters.
     """
     import clvol
+    from clvol.base.output_files import check_spares
     from clvol.lab.ray.view import check_output
 
     outputs = outputs or ("ray.png",)
     for output in outputs:
         check_output(output)
     loaded = clvol.load_file(scene, **dict(definitions))
+    for output in outputs:
+        check_spares(output, loaded.files)
     number = None if channel is None else CHANNELS.index(channel)
     with _bar(quiet) as progress:
         view = clvol.trace_ray(loaded, x, y, channel=number, progress=progress, **options)

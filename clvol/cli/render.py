@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
 import os
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
 from clvol.cli.frames import Frames, Series, check_series, frame_options
-from clvol.cli.messages import exit_by, logging_to, mention
+from clvol.cli.messages import logging_to
 from clvol.cli.options import (
     ExplainedCommand,
     SampleRange,
@@ -27,21 +25,15 @@ from clvol.cli.options import (
     quiet_option,
     step_option,
 )
+from clvol.cli.painter import Painter
 from clvol.cli.pictures import Shown, picture_options, write_views
 from clvol.cli.quality import Quality, extent_of, write_qualities
 from clvol.cli.volumes import Asked, Background, volume_options, write_looks
-from clvol.errors import Error
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
-    from rich.console import Console
-
-    from clvol.base.output_files import StrPath
-    from clvol.picture.profile import Profile
-    from clvol.picture.result import Result
     from clvol.picture.tev import Tev
-    from clvol.scene.records import Scene
 
 EXAMPLES = """
 \b
@@ -201,80 +193,6 @@ def render(
         painter.picture(outputs, profiled)
 
 
-@dataclass
-class Painter:
-    """Renders scenes and saves the pictures, as the command line says."""
-
-    asked: Asked
-    options: dict[str, Any]
-    shown: Shown
-    trace: str | None
-    quiet: bool
-    console: Console
-    tev: Tev | None = None
-
-    def result(self, scene: Scene, outputs: Sequence[str]) -> Result:
-        """Render a scene that fits the outputs."""
-        import clvol
-        from clvol.base.progress import RichProgress, Several
-
-        _check_room(scene, outputs, self.options)
-        piloted = self.options["technique"] == "auto:pilot"
-        if piloted and not self.quiet and not self.console.is_terminal:
-            from clvol.lab.repeat import announcement
-
-            mention([announcement(scene, self.options)], err=True)
-        if self.tev:
-            self.tev.begin(outputs[0] if outputs else "clvol")
-        with nullcontext() if self.quiet else RichProgress(self.console) as bar:
-            watching = Several(*(one for one in (bar, self.tev) if one is not None))
-            result: Result = clvol.render(scene, progress=watching, **self.options)
-        if self.tev:
-            self.tev.finish(result)
-        if piloted:
-            from clvol.lab.repeat import with_definitions
-
-            result.metadata["repeat"] = with_definitions(
-                result.metadata["repeat"], self.asked.definitions, self.asked.assignments
-            )
-        return result
-
-    def frame(self, scene: Scene, outputs: Sequence[str]) -> Result:
-        """Render and save one of many; one that was ended early is not saved."""
-        from clvol.picture.saving import save_all
-
-        result = self.result(scene, outputs)
-        if not result.stats["interrupted"]:
-            self.shown = self.shown.fixed(result)  # or the film would flicker
-            for failure in save_all(self.shown.encoder(result), outputs).values():
-                raise failure
-        return result
-
-    def picture(self, outputs: Sequence[str], profiled: bool) -> NoReturn:
-        """Render and save the only one, tell of it, and exit."""
-        from clvol.cli.profile import profile_lines
-        from clvol.picture.saving import save_all
-
-        loaded, lines = self.asked.open(self.options["size"])
-        if lines and not self.quiet:
-            mention(lines)
-        result = self.result(loaded, outputs)
-        failures = save_all(self.shown.encoder(result), outputs)
-        if self.trace is not None and result.profile:
-            failures |= _save_trace(result.profile, self.trace)
-        written = [output for output in outputs if output not in failures]
-        if result.stats["interrupted"]:
-            saved = ", saved what there is" if written else ""
-            mention([f"clvol: interrupted after {result.samples[1]} spp{saved}"], err=True)
-        if not self.quiet:
-            mention([*_summary(result, written), *self.shown.said(result)])
-        if profiled and result.profile:
-            mention(profile_lines(result.profile))
-        for failure in failures.values():
-            raise failure
-        exit_by(result.stats["interrupted"])
-
-
 def _tev_at(address: str | None) -> AbstractContextManager[Tev | None]:
     """The viewer that --tev names, to be left at the end."""
     if address is None:
@@ -305,18 +223,6 @@ def _picture_to_go_on_from(outputs: Sequence[str], series: bool) -> str | None:
     return first if os.path.lexists(first) else None
 
 
-def _check_room(loaded: Scene, outputs: Sequence[str], options: dict[str, Any]) -> None:
-    """Refuse files that could not hold the picture."""
-    from clvol.picture.formats import check_holds
-    from clvol.picture.saving import check_disk
-    from clvol.scene.views import viewed
-
-    film = viewed(loaded, options["sensor"], options["size"]).film
-    for output in outputs:
-        check_holds(output, alpha=film.has_alpha, size=film.window[2:])
-        check_disk(output, math.prod(film.window[2:]), len(options["aov"]))
-
-
 def _check_files(
     read: Mapping[str, str], outputs: Sequence[str], trace: str | None, shown: Shown, aovs: bool
 ) -> None:
@@ -331,15 +237,6 @@ def _check_files(
     _check_distinct(read, outputs if trace is None else (*outputs, trace))
 
 
-def _save_trace(profile: Profile, path: str) -> dict[StrPath, Error]:
-    """Write the trace; what went wrong with it, if anything."""
-    try:
-        profile.save_trace(path)
-    except Error as error:
-        return {path: error}
-    return {}
-
-
 def _check_distinct(read: Mapping[str, str], outputs: Sequence[str]) -> None:
     """Refuse pictures that would replace each other or what is `read`, whatever the links to them."""
     names = {os.path.realpath(name): what for name, what in read.items()}
@@ -348,26 +245,3 @@ def _check_distinct(read: Mapping[str, str], outputs: Sequence[str]) -> None:
         if place in names:
             raise click.UsageError(f"{output}: would replace {names[place]}")
         names[place] = "another picture"
-
-
-def _summary(result: Result, written: Sequence[str]) -> Iterator[str]:
-    """What was written, what it cost and how sure it is."""
-    from clvol.base.progress import format_noise
-
-    height, width = result.image.shape[:2]
-    about, count = result.metadata, result.samples[1]
-    seconds = about["seconds"]
-    rate = width * height * count / max(seconds, 1e-9)
-    mean = " on the mean" if "target_error" in about else ""
-    yield f"{', '.join(written) or 'not saved'}: {width} x {height} pixels, {count} spp{mean}"
-    yield f"  {seconds:.2f} s, {rate:,.0f} samples/s, noise {format_noise(result.noise)}"
-    choices = ("technique", "transmittance", "majorant", "lookup")
-    used = [f"{key} {about[key]}" for key in choices if about[key] != "none" or key == "transmittance"]
-    lookups = result.stats["lookups"] / max(width * height * count, 1)
-    if used == ["transmittance none"]:
-        yield "  no media"
-    else:
-        yield f"  {', '.join(used)}; {lookups:.4g} look-ups per sample"
-    if "pilot" in about:
-        yield f"  pilot: {about['pilot_reason']}; repeat with"
-        yield f"  {about['repeat']}"

@@ -28,14 +28,21 @@ Examples:
 )
 @click.option("--size", type=Size(), metavar="WxH", help="Pixels of the picture, as 640x480.")
 @click.option("--spp", type=click.IntRange(min=1), help="Samples per pixel.")
+@click.option("--overwrite", is_flag=True, help="Replace a light beside the scene that is there already.")
 @quiet_option
 def scene(
-    volume: str, output: str, size: tuple[int, int] | None, spp: int | None, quiet: bool, **given: Any
+    volume: str,
+    output: str,
+    size: tuple[int, int] | None,
+    spp: int | None,
+    overwrite: bool,
+    quiet: bool,
+    **given: Any,
 ) -> None:
     """Write the scene that `clvol render VOLUME` would render, as a Mitsuba 3 XML file.
 
-    It names the volume's file, and lights that XML cannot hold lie beside it as .exr. What was chosen stands
-    in its first lines.
+    It names the volume's file. A light that XML cannot hold lies beside it, as FILE_environment.exr. What was
+    chosen stands in its first lines.
     """
     from clvol.staging.saving import check_scene, save_scene
     from clvol.staging.source import Source
@@ -44,6 +51,6 @@ def scene(
     check_scene(output, volume)
     staged = stage(Source.of(volume), given, size_of(size), spp or SPP)
     staged.load()
-    written = save_scene(staged, output)
+    written = save_scene(staged, output, overwrite)
     if not quiet:
         tell([*staged.lines, f"{', '.join(written)}: the scene"])

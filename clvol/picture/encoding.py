@@ -32,6 +32,7 @@ class Pictured(Protocol):
     estimate: Estimate
     component_format: str | None
     denoised: np.ndarray | None
+    files: tuple[str, ...]
 
     @property
     def alpha(self) -> np.ndarray | None:
@@ -78,6 +79,7 @@ def _record(result: Pictured, component: str) -> str:
         "ranges": result.ranges,
         "sums": kept_sums.described(result.estimate, component == "float16"),
         "component_format": result.component_format,
+        "files": result.files,
     }
     return json.dumps(said, default=_plain)
 

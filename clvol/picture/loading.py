@@ -105,6 +105,7 @@ def _result(said: Any, layers: dict[str, np.ndarray]) -> Result:
     count = _whole(said["samples"])
     result = Result(image, variance, stats, layers, metadata, (ranges[0][0], count), estimate, ranges)
     result.component_format, result.denoised = said.get("component_format"), denoised
+    result.files = tuple(map(str, said.get("files", ())))
     return result
 
 

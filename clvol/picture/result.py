@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from clvol.base.extras import need
+from clvol.base.output_files import check_spares
 from clvol.errors import OptionError
 from clvol.picture import denoising, image_io
 from clvol.picture.encoding import encode_result, shown_layers
@@ -88,7 +89,9 @@ class Result:
         What `denoise` made of the image, with alpha (height, width, 4): to be looked at, and what is shown.
         Nothing is measured in it.
     scenery : `clvol.picture.scenery.Scenery` or None
-        Where the one volume of the scene is in the picture, for labels; files do not keep it.
+        Where the one volume of the scene is in the picture, for labels.
+    files : tuple of str
+        What the scene was read from, which `save` does not replace.
     """
 
     image: np.ndarray
@@ -103,6 +106,7 @@ class Result:
     component_format: str | None = None
     denoised: np.ndarray | None = None
     scenery: Scenery | None = None
+    files: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         self.ranges = self.ranges or (self.samples,)
@@ -283,11 +287,12 @@ class Result:
         Raises
         ------
         OptionError
-            Unknown suffix, display or view, impossible exposure, or what the format cannot hold; a folder
-            that is missing or cannot be written to; or a file that failed, as on a full disk: the picture is
-            then kept where the message says.
+            Unknown suffix, display or view, impossible exposure, or what the format cannot hold; a file that
+            the scene is read from; a folder that is missing or cannot be written to; or a file that failed,
+            as on a full disk: the picture is then kept where the message says.
         """
         view = View(exposure, display, view_transform)
+        check_spares(path, self.files)
         size = self.image.shape[1], self.image.shape[0]
         check_picture(path, view, component_format, alpha=self.alpha is not None, size=size)
         for failure in save_all(lambda s: encode_result(self, s, view, component_format), [path]).values():

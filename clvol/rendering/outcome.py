@@ -42,7 +42,7 @@ def make_result(session: Session, first: int, count: int, final: bool = True) ->
         estimate.reshaped(*shape, 3), (first, count), aovs, stats, metadata_of(session, first, samples)
     )
     result.component_format = session.prepared.scene.film.component_format
-    result.scenery = scenery_of(session.prepared)
+    result.scenery, result.files = scenery_of(session.prepared), session.prepared.scene.files
     if final:
         _warn(session, stats)
         _warn_of_unseen(session, result)

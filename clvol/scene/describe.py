@@ -12,6 +12,7 @@ import numpy as np
 from clvol.base.memory import format_bytes
 from clvol.scene import records
 from clvol.scene.materials import Bsdf, Dielectric, Mask, Null, TwoSided
+from clvol.scene.vocabulary import listed
 from clvol.volumes import GridInfo, read_volume
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
 from clvol.volumes.listing import box_of
@@ -19,6 +20,9 @@ from clvol.volumes.read import SPARSE, list_sparse, read_sparse
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+MOST_FILES = 20
+"""Names of files that are listed."""
 
 
 def describe_volume(path: str, grid: str | None = None) -> list[str]:
@@ -150,6 +154,8 @@ def _scene_lines(scene: records.Scene) -> Iterator[str]:
         yield f"shape    {_shape(shape)}"
     for emitter in scene.emitters:
         yield f"light    {_emitter(emitter)}"
+    if scene.files:
+        yield f"files    {listed(scene.files, MOST_FILES)}"
 
 
 def _camera(sensor: records.Perspective) -> str:

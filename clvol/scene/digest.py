@@ -13,7 +13,7 @@ take seconds."""
 
 
 _APART = (
-    *("source", "name", "spp", "seed", "choices", "sensors", "component_format", "kept"),
+    *("source", "files", "name", "spp", "seed", "choices", "sensors", "component_format", "kept"),
     *("sanitize", "repairs"),  # the samples tell
 )
 """Fields that do not tell scenes apart."""

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from clvol.base.files import other_kind
+from clvol.base.files import note_file, other_kind
 from clvol.errors import SceneError
 from clvol.volumes.read import split_address
 
@@ -29,7 +29,10 @@ def find(name: str, folders: Sequence[Path], where: str, folder_too: bool = Fals
     for folder in folders:
         path = folder / name
         # false, unlike Path.is_file, for a name too long for the system
-        if os.path.isfile(path) or (folder_too and os.path.isdir(path)):
+        if os.path.isfile(path):
+            note_file(path)
+            return path
+        if folder_too and os.path.isdir(path):
             return path
         if kind := other_kind(path):
             raise SceneError(f"'{path}' is {kind}, not a file", where)

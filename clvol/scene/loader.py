@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from clvol.base.files import files_noted
 from clvol.errors import SceneError, shown
 from clvol.scene import bsdf, classified, emitter, integrator, medium, phase, sensor, shape, texture, volume
 from clvol.scene.library import Grids, Library, PluginTable
@@ -19,7 +20,7 @@ from clvol.scene.vocabulary import listed
 from clvol.scene.xml import read_xml, read_xml_text
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
 PLUGINS: PluginTable = {
     "integrator": {
@@ -118,7 +119,7 @@ def load_file(path: str | Path, **defaults: object) -> Scene:
     """
     if not isinstance(path, str | os.PathLike):
         raise SceneError(f"load_file takes a file's name, not {shown(path)}", hint="load_dict takes dicts")
-    return _build(read_xml(Path(path), defaults), source=str(path))
+    return _loaded(lambda: read_xml(Path(path), defaults), source=str(path))
 
 
 def load_string(text: str, **defaults: object) -> Scene:
@@ -145,7 +146,7 @@ def load_string(text: str, **defaults: object) -> Scene:
         raise SceneError(
             f"load_string takes a string of XML, not {shown(text)}", hint="load_dict takes dicts"
         )
-    return _build(read_xml_text(text, defaults), source="")
+    return _loaded(lambda: read_xml_text(text, defaults))
 
 
 def load_dict(scene: Mapping[str, object]) -> Scene:
@@ -167,7 +168,7 @@ def load_dict(scene: Mapping[str, object]) -> Scene:
     SceneError, VolumeError
         As `load_file`, with a path such as ``scene.shape_1.interior.sigma_t`` for the place.
     """
-    return _build(from_dict(scene), source="")
+    return _loaded(lambda: from_dict(scene))
 
 
 def load_plugin(plugin: Mapping[str, object], grids: Grids) -> Any:
@@ -179,9 +180,9 @@ def load_plugin(plugin: Mapping[str, object], grids: Grids) -> Any:
     return build(node, Library(node, PLUGINS, grids))
 
 
-def load_staged(scene: Mapping[str, object], source: str, grids: Grids) -> Scene:
-    """As `load_dict`, of a scene made for what `source` names, with volumes that were read before."""
-    return _build(from_dict(scene), source, grids)
+def load_staged(scene: Mapping[str, object], source: str, grids: Grids, files: Iterable[str]) -> Scene:
+    """As `load_dict`, of a scene made for what `source` names, with volumes that were read from `files`."""
+    return _loaded(lambda: from_dict(scene), source, grids, files)
 
 
 def load_sensor(given: Mapping[str, object]) -> tuple[Sensor, set[str]]:
@@ -192,6 +193,15 @@ def load_sensor(given: Mapping[str, object]) -> tuple[Sensor, set[str]]:
         raise SceneError(f"'{node.type}' is a {kind}, not a sensor", node.where)
     inside = (value for _, value in node.parameters() if isinstance(value, Node) and not value.is_value)
     return build(node, library), {library.kind_of(library.resolve(value)) for value in inside}
+
+
+def _loaded(
+    read: Callable[[], Node], source: str = "", grids: Grids | None = None, files: Iterable[str] = ()
+) -> Scene:
+    """The scene of the nodes that `read` returns, which knows what files it was read from."""
+    with files_noted() as noted:
+        scene = _build(read(), source, grids)
+    return replace(scene, files=tuple(dict.fromkeys((*files, *noted))))
 
 
 def _build(root: Node, source: str, grids: Grids | None = None) -> Scene:

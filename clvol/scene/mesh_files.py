@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.base.files import other_kind
+from clvol.base.files import note_file, other_kind
 from clvol.scene.gltf import plain_gltf
 from clvol.scene.mesh import RawMesh, build_mesh
 from clvol.scene.obj import read_obj
@@ -99,6 +99,8 @@ def _regular_files(path: Path) -> FilePathResolver:
             for part in (name.strip(), name.strip().lstrip("/"), Path(name).name):
                 if kind := other_kind(Path(self.parent, part)):
                     raise ValueError(f"'{part}', which it names, is {kind}, not a file")
+                if os.path.isfile(found := Path(self.parent, part)):
+                    note_file(found)
             data: bytes = super().get(name)
             return data
 

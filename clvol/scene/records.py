@@ -347,6 +347,7 @@ class Scene:
     spp: int = 4
     seed: int = 0
     source: str = ""  # file the scene came from, for messages and metadata
+    files: tuple[str, ...] = field(default=(), repr=False)  # all it was read from: nothing replaces them
     sensors: tuple[Sensor, ...] = ()
     kept: Kept = field(default_factory=Kept, repr=False)
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import logging
+import os
 from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from clvol.base.files import note_file
 from clvol.scene.files import find_parameter, find_volume
 from clvol.scene.records import ConstVolume, GridVolume, Volume
 from clvol.scene.transforms import scale, translate
@@ -115,7 +117,10 @@ def _grid(reader: Reader) -> Grid:
         if name is not None:
             reader.fail(f"an array has no grid named '{name}'", "grid", "the name goes with a filename")
         if isinstance(reader.node[sources[0]], DenseGrid | SparseGrid):
-            return cast("Grid", reader.raw(sources[0]))
+            grid = cast("Grid", reader.raw(sources[0]))
+            if os.path.isfile(grid.source):
+                note_file(grid.source)
+            return grid
         where = reader.node.place(sources[0])
         if is_labelled(reader.node[sources[0]]):
             return grid_from_labelled(reader.raw(sources[0]), where)

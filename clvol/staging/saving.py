@@ -6,15 +6,16 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from clvol.base.output_files import check_file, output_suffix, write_file
+import numpy as np
+
+from clvol.base.image_reading import UnreadableError, read_stored
+from clvol.base.output_files import check_file, check_spares, output_suffix, write_file
 from clvol.errors import OptionError
 from clvol.picture.image_io import encode_exr, split_channels
 from clvol.scene.xml_writing import scene_xml
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-    import numpy as np
 
     from clvol.base.output_files import StrPath
     from clvol.staging.stage import Staged
@@ -28,25 +29,43 @@ def check_scene(path: StrPath, volume: StrPath) -> None:
         raise OptionError("would replace the volume", str(path))
 
 
-def save_scene(staged: Staged, path: StrPath) -> list[str]:
-    """Write the scene as `path`, .xml, and environments beside it; the names of all files.
+def save_scene(staged: Staged, path: StrPath, overwrite: bool = False) -> list[str]:
+    """Write the scene as `path`, .xml, and its environment beside it; the names of all files.
 
-    Paths of volumes become relative to the scene's folder, where they were not absolute.  OptionError where a
-    file cannot be written.
+    Paths of volumes become relative to the scene's folder, where they were not absolute.
+
+    Parameters
+    ----------
+    overwrite : an environment that is there already, and is another one, is replaced.
+
+    OptionError where a file cannot be written, or would replace what the scene is read from.
     """
     target = Path(path)
-    written: list[str] = []
+    beside: dict[Path, bytes] = {}
 
     def attach(name: str, array: np.ndarray) -> str:
         file = target.with_name(f"{target.stem}_environment.exr")
-        write_file(file, encode_exr(split_channels("", array), {}))
-        written.append(str(file))
+        beside[file] = encode_exr(split_channels("", array), {})
+        if not overwrite and os.path.lexists(file) and not _holds(file, array):
+            what = "is there already, and is another light than this scene's"
+            raise OptionError(what, str(file), "give the scene another name, or --overwrite")
         return file.name
 
     comment = "\n     ".join([f"The scene that clvol makes of {staged.source.name}.", *staged.lines])
     xml = scene_xml(_moved(staged.description, target.parent), attach, comment)
-    write_file(target, xml.encode())
-    return [str(target), *written]
+    for file in (target, *beside):
+        check_spares(file, staged.source.files)
+    for file, data in (beside | {target: xml.encode()}).items():
+        write_file(file, data)
+    return [str(target), *map(str, beside)]
+
+
+def _holds(file: Path, array: np.ndarray) -> bool:
+    """Whether a file is just that picture: the one of the scene's earlier version, which stays the same."""
+    try:
+        return file.is_file() and np.array_equal(read_stored(str(file)).pixels, array)
+    except (OSError, UnreadableError):
+        return False
 
 
 def _moved(described: Mapping[str, Any], folder: Path) -> dict[str, Any]:

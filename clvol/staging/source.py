@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from clvol.base.files import files_noted
 from clvol.errors import OptionError, shown
 from clvol.scene.loader import load_plugin
 from clvol.scene.records import ConstVolume, GridVolume, Volume
@@ -32,12 +33,13 @@ UNIT_BOX = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
 class Source:
     """A volume's file, or its arrays by name ("" for one alone).
 
-    `grids` are those that were read, so that the scene need not read them again.
+    `grids` are those that were read, so that the scene need not read them again, and `files` what from.
     """
 
     path: StrPath | None = None
     arrays: Mapping[str, Any] = field(default_factory=dict)
     grids: Grids = field(default_factory=dict)
+    files: dict[str, None] = field(default_factory=dict)
 
     @classmethod
     def of(cls, volume: Any) -> Source:
@@ -67,7 +69,10 @@ class Source:
         else:
             plugin = {"type": "gridvolume", "filename": str(self.path)}
             plugin |= {"grid": name} if name else {}
-        return Field.of(name, plugin | dict(use), self.grids)
+        with files_noted() as noted:
+            found = Field.of(name, plugin | dict(use), self.grids)
+        self.files.update(noted)
+        return found
 
 
 @dataclass(frozen=True, eq=False)

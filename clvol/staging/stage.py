@@ -50,7 +50,7 @@ class Staged:
     def load(self) -> Scene:
         """The scene, ready to be rendered."""
         name = "" if self.source.path is None else self.source.name
-        return load_staged(self.description, name, self.source.grids)
+        return load_staged(self.description, name, self.source.grids, self.source.files)
 
 
 def stage(

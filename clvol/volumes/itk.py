@@ -14,12 +14,14 @@ import re
 import struct
 import zlib
 from contextlib import contextmanager
+from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
 from clvol.base.extras import need
+from clvol.base.files import note_file
 from clvol.errors import VolumeError
 from clvol.volumes.files import CHUNK, TRUNCATED, open_binary
 from clvol.volumes.placed import Axis, check_size, part_of, placed_grid, samples, split_indices
@@ -37,6 +39,8 @@ SUFFIXES = (".nii", ".nii.gz", ".nrrd", ".nhdr", ".mha", ".mhd", ".dcm")
 UNEVEN = 0.01
 """Share of their mean by which the distances of slices may differ before a warning says so."""
 _MILLIMETRES = "mm"
+_HEADER = 1 << 20
+_DATA_FILE = re.compile(r"(?:ElementDataFile\s*=|data ?file:)\s*(.+)", re.IGNORECASE)
 
 
 def read_itk(path: str | os.PathLike[str], grid: str | None = None) -> DenseGrid:
@@ -65,7 +69,23 @@ def read_itk(path: str | os.PathLike[str], grid: str | None = None) -> DenseGrid
         if part:
             reader.SetExtractIndex([0, 0, 0, part[0]])
             reader.SetExtractSize([*size[:3], 0])
+        for file in _data_files(Path(path)):
+            note_file(file)
         return _grid(sitk, reader, path)
+
+
+def _data_files(path: Path) -> Iterator[Path]:
+    """The files beside a header of MetaImage or NRRD that have its samples."""
+    if path.suffix.lower() not in (".mhd", ".nhdr"):
+        return
+    with open_binary(path) as file:
+        lines = file.read(_HEADER).decode("latin-1").splitlines()
+    for number, line in enumerate(lines):
+        if found := _DATA_FILE.fullmatch(line):
+            name = found[1].split("%")[0]  # of numbered files, all that begin so
+            names = lines[number + 1 :] if name.split(" ")[0] == "LIST" else [name]
+            for one in filter(None, map(str.strip, names)):
+                yield from path.parent.glob(f"{escape(one)}*" if "%" in found[1] else escape(one))
 
 
 def read_dicom(folder: str | os.PathLike[str], grid: str | None = None) -> DenseGrid:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clvol.base.extras import need
+from clvol.base.files import note_file
 from clvol.errors import VolumeError
 from clvol.volumes.files import TRUNCATED, open_binary
 from clvol.volumes.placed import Axis, check_size, part_of, placed_grid, samples, split_indices
@@ -85,6 +86,7 @@ def _stack(tiff: Any, indices: tuple[int, ...], path: str | os.PathLike[str], si
     if len(alike[0].shape) > 2:
         alike = alike[:1]
     for page in (page for each in alike for page in each.pages if page is not None):
+        note_file(page.parent.filehandle.path)  # OME puts the pictures of a stack into several files
         ends = zip(page.dataoffsets, page.databytecounts, strict=True)
         if any(start + count > size for start, count in ends):
             raise VolumeError("its pictures reach beyond its end", where, TRUNCATED)

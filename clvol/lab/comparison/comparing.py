@@ -124,7 +124,9 @@ def compare(
         )
         figures = compute_figures(measured, truth, chosen)
     about = _about(scene, opened, effort, step, measured, truth)
-    return Comparison(figures, chosen, truth, lineup.left_out, lineup.doubles, interrupted, about)
+    return Comparison(
+        figures, chosen, truth, lineup.left_out, lineup.doubles, interrupted, about, scene.files
+    )
 
 
 def _nothing_to_compare(reasons: list[str]) -> OptionError:

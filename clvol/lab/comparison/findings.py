@@ -30,6 +30,8 @@ class Findings:
         Whether Ctrl-C ended it early.
     about
         How it was made.
+    files
+        What the scene was read from, which the report does not replace.
     """
 
     figures: tuple[Figures, ...]
@@ -39,6 +41,7 @@ class Findings:
     doubles: tuple[tuple[str, str], ...] = ()
     interrupted: bool = False
     about: dict[str, Any] = field(default_factory=dict)
+    files: tuple[str, ...] = ()
 
     def __getitem__(self, label: str) -> Figures:
         """The figures of one combination."""

@@ -41,6 +41,7 @@ from clvol.lab.comparison.words import sentences
 from clvol.picture import image_io
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from clvol.lab.comparison.figures import Curve, Figures
@@ -52,12 +53,18 @@ _LEAST_BYTES = 2**18
 _JSON, _HTML, _REFERENCE = "report.json", "report.html", "reference.exr"
 
 
-def check_folder(folder: str | os.PathLike[str]) -> None:
-    """Raise OptionError now for a folder that `write_report` could not or should not replace later."""
+def check_folder(folder: str | os.PathLike[str], read: Sequence[str] = ()) -> None:
+    """Raise OptionError now for a folder that `write_report` could not or should not replace later.
+
+    read : files of the scene, none of which may be in the folder.
+    """
     need_matplotlib("a report")
     where, target = os.fspath(folder), real(folder)
     if target.exists() and not target.is_dir():
         raise OptionError("is a file, and a report is a folder", where=where)
+    for name in read:
+        if target in real(name).parents:
+            raise OptionError(f"holds '{name}', which the scene is read from", where, "take another folder")
     if target.is_dir():
         foreign = sorted({p.name for p in target.iterdir()} - _own_files(target))
         if foreign:
@@ -74,7 +81,7 @@ def write_report(findings: Findings, folder: str | os.PathLike[str]) -> None:
 
     OptionError as `check_folder` says, and as `write_or_keep`.
     """
-    check_folder(folder)
+    check_folder(folder, findings.files)
     write_or_keep(findings, folder)
 
 
@@ -82,7 +89,7 @@ def write_or_keep(findings: Findings, folder: str | os.PathLike[str]) -> None:
     """Write the folder, or, where that fails, as on a full disk, another one; OptionError then says which."""
     files = _files(findings)
     try:
-        check_folder(folder)
+        check_folder(folder, findings.files)
         _replace(real(folder), files)
     except (OSError, OptionError) as error:
         name = f"clvol-report-{secrets.token_hex(4)}"

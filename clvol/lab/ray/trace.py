@@ -130,7 +130,7 @@ def trace_ray(
     return RayView(
         os.path.basename(scene.source or "") or "scene",
         *((x, y), _name(medium), seed, opened.description, place, channel),
-        *(sigma_t, tuple(watched), (*place.notes, *notes)),
+        *(sigma_t, tuple(watched), (*place.notes, *notes), scene.files),
     )
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clvol.base.extras import need_matplotlib
-from clvol.base.output_files import check_file, output_suffix, write_file
+from clvol.base.output_files import check_file, check_spares, output_suffix, write_file
 from clvol.lab.digits import up_to_error
 from clvol.lab.ray.walks import Watched, format_estimate
 from clvol.lab.ray.watched import WatchedRay
@@ -93,10 +93,11 @@ class RayView(WatchedRay):
     def save(self, path: str | PathLike[str]) -> None:
         """Write the view as .png, .svg, .pdf (the figure) or .json (the numbers), by the path's suffix.
 
-        Raises OptionError for another suffix, or a file that cannot be written; an earlier file is replaced
-        only once the new one is complete.
+        Raises OptionError for another suffix, or a file that cannot be written or that the scene is read
+        from; an earlier file is replaced only once the new one is complete.
         """
         check_output(path)
+        check_spares(path, self.files)
         write_file(path, self._encoded(Path(path).suffix.lower()[1:], 150))
 
     def _encoded(self, kind: str, dpi: int) -> bytes:

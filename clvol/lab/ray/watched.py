@@ -36,6 +36,8 @@ class WatchedRay:
         Each technique and transmittance, in the order asked for.
     notes
         What a viewer has to know, in sentences.
+    files
+        What the scene was read from, which `save` does not replace.
     """
 
     scene: str
@@ -48,6 +50,7 @@ class WatchedRay:
     sigma_t: np.ndarray
     watched: tuple[Watched, ...]
     notes: tuple[str, ...]
+    files: tuple[str, ...] = ()
 
     @property
     def edges(self) -> np.ndarray:
