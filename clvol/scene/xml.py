@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.base.files import other_kind
+from clvol.base.files import open_regular, other_kind
+from clvol.base.kinds import kind_of_file
 from clvol.errors import SceneError, shortened, shown
 from clvol.scene import transforms
 from clvol.scene.files import find
@@ -29,7 +30,7 @@ from clvol.scene.xml_values import (
     parse_spectrum,
     parse_xyz,
 )
-from clvol.volumes.read import is_volume
+from clvol.volumes.read import SUFFIXES, is_volume
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -72,8 +73,22 @@ def read_xml(path: Path, keywords: Mapping[str, object]) -> Node:
     if is_volume(path):
         hint = "`clvol scene` makes a scene of it, `clvol render` a picture"
         raise SceneError(f"'{path}' is a volume, not a scene", hint=hint)
+    _check_xml(path)
     reader = _XmlReader(keywords)
     return _finished(reader, reader.file(path, [], ""), keywords, str(path))
+
+
+def _check_xml(path: Path) -> None:
+    """SceneError for a file that is something else, with what to do about that."""
+    with open_regular(path, SceneError, "scene file") as file:
+        head = file.read(256).lstrip(b"\xef\xbb\xbf\xff\xfe\0 \t\r\n")
+    what, hint = kind_of_file(path)
+    if head.startswith(b"<") or (not what and path.suffix.lower() == ".xml"):
+        return
+    known = f"scenes are Mitsuba's .xml, volumes {', '.join(SUFFIXES[:5])} and others: see clvol info --help"
+    raise SceneError(
+        f"is {what + ', ' if what else ''}neither a scene nor a volume", str(path), hint or known
+    )
 
 
 TEXT = "the text"

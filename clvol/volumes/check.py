@@ -9,6 +9,7 @@ import numpy as np
 from clvol.errors import VolumeError
 from clvol.volumes.files import place
 from clvol.volumes.grid import LEVEL_SET, DenseGrid, Grid
+from clvol.volumes.narrowing import SMALLEST, vanishing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -50,10 +51,11 @@ def _check(grid: Grid, what: str, signed: bool) -> None:
             'make a fog volume of it: level_set="fog"',
         )
     total = broken = negative = 0
-    lowest = 0.0
+    lowest = highest = 0.0
     for slab in slabs(grid):
         total += slab.size
         low, high = slab.min(), slab.max()
+        highest = max(highest, float(high))  # NaN stays out
         if (np.isfinite(low) if signed else low >= 0) and np.isfinite(high):
             continue
         broken += slab.size - int(np.count_nonzero(np.isfinite(slab)))
@@ -62,6 +64,8 @@ def _check(grid: Grid, what: str, signed: bool) -> None:
         below = (slab < 0) & np.isfinite(slab)
         negative += int(np.count_nonzero(below))
         lowest = min(lowest, float(slab.min(where=below, initial=0.0)))
+    if not broken and 0 < highest < SMALLEST and not negative:
+        raise vanishing(highest, where)
     faults = []
     if broken:
         faults.append(f"{broken} NaN or infinite")

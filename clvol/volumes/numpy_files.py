@@ -18,6 +18,7 @@ from clvol.base.masks import as_array, masked_count
 from clvol.errors import VolumeError
 from clvol.volumes.files import CHUNK, MAX_BYTES, TRUNCATED, allocate, fill, open_binary, place
 from clvol.volumes.grid import DenseGrid
+from clvol.volumes.narrowing import Narrowing
 
 if TYPE_CHECKING:
     from io import BufferedIOBase, BufferedReader
@@ -52,13 +53,14 @@ def dense_from_array(array: ArrayLike, name: str = "", source: str = "") -> Dens
     except (TypeError, ValueError) as error:
         raise VolumeError(f"is not an array ({error})", where) from None
     check_layout(given.dtype, given.shape, where)
-    values = allocate(given.shape, np.float32, where)
-    # A double beyond float32 becomes infinite, and is reported as such when the values are checked.
-    with np.errstate(over="ignore", invalid="ignore"):
-        values[...] = np.ma.getdata(given)
+    values, narrowed = allocate(given.shape, np.float32, where), Narrowing(where)
     masked = masked_count(given)
+    planes = max(CHUNK // (given.dtype.itemsize * math.prod(given.shape[1:])), 1)
+    for first in range(0, len(given), planes):
+        part = given[first : first + planes]
+        values[first : first + planes] = narrowed(np.ma.filled(part, 0) if masked else np.ma.getdata(part))
+    narrowed.check()
     if masked:
-        values[np.ma.getmaskarray(given)] = 0
         log.warning("%s: %d of %d samples are masked, and taken as 0", where, masked, values.size)
     return _grid(values, name, source)
 
@@ -190,15 +192,14 @@ def _read_samples(
     if dtype == np.float32 and not fortran:
         fill(values, file, where)
         return values
-    target = values.T if fortran else values
+    target, narrowed = values.T if fortran else values, Narrowing(where)
     planes = max(CHUNK // (dtype.itemsize * math.prod(target.shape[1:])), 1)
     for first in range(0, len(target), planes):
         part = target[first : first + planes]
         stored = np.empty(part.shape, dtype)
         fill(stored, file, where)
-        # A double beyond float32 becomes infinite, and is reported as such when the values are checked.
-        with np.errstate(over="ignore", invalid="ignore"):
-            part[...] = stored
+        part[...] = narrowed(stored)
+    narrowed.check()
     return values
 
 

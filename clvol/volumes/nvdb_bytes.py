@@ -33,25 +33,35 @@ MOST_BLOCK = 1 << 26
 
 
 class GridBytes:
-    """A grid of `size` bytes that takes `packed` bytes of the file from `start` on.
+    """A grid of `size` bytes in the `packed` bytes of the file from `start` on.
+
+    before : bytes of other grids that are packed with it and come first.
 
     Reading beyond its end, or what its chunks do not hold, is a VolumeError.
     """
 
-    def __init__(self, stream: VdbStream, codec: int, start: int, packed: int, size: int) -> None:
-        self.stream, self.codec, self.start, self.size = stream, codec, start, size
+    def __init__(
+        self, stream: VdbStream, codec: int, start: int, packed: int, size: int, before: int = 0
+    ) -> None:
+        self.stream, self.codec, self.start, self.size, self.before = stream, codec, start, size, before
         self.end = start + packed
         self._pieces: Iterator[bytes] = iter(())
-        self._held, self._first = bytearray(), size + 1  # bytes in memory, and where they are in the grid
+        self._held = bytearray()  # bytes in memory, and where they are in what is packed
+        self._first = before + size + 1
 
     def fail(self, what: str) -> NoReturn:
         """Raise a VolumeError for this file."""
         self.stream.fail(what)
 
+    def release(self) -> None:
+        """Let go of what is in memory."""
+        self._pieces, self._held, self._first = iter(()), bytearray(), self.before + self.size + 1
+
     def take(self, offset: int, count: int) -> bytes:
         """Bytes `offset` to `offset + count` of the grid."""
         if not 0 <= offset <= self.size - count:
             self.fail(f"byte {offset + count} is pointed to in a grid of {self.size} bytes")
+        offset += self.before
         if self.codec == NONE:
             self.stream.seek(self.start + offset)
             return self.stream.take(count)
@@ -60,7 +70,8 @@ class GridBytes:
         while offset + count > self._first + len(self._held):
             piece = next(self._pieces, b"")
             if not piece:
-                self.fail(f"its data unpacks to {self._first + len(self._held)} of {self.size} bytes")
+                there = self._first + len(self._held)
+                self.fail(f"its data unpacks to {there} of {self.before + self.size} bytes")
             if self._first + len(self._held) <= offset:
                 self._first += len(self._held)
                 self._held.clear()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from clvol.errors import VolumeError
 from clvol.volumes.grid import FOG_VOLUME, LEVEL_SET, STAGGERED
 from clvol.volumes.grid_info import numbered
 from clvol.volumes.nvdb_bytes import CODEC_NAMES, MOST_RATIO, NONE, GridBytes
@@ -59,7 +60,10 @@ KINDS = {1: LEVEL_SET, 2: FOG_VOLUME, 3: STAGGERED}
 
 @dataclass(frozen=True)
 class NanoEntry:
-    """One grid of a file: its name, the number of those of that name before it, and where it is."""
+    """One grid of a file: its name, the number of those of that name before it, and where it is.
+
+    before : bytes of the grids that are packed with it and come first.
+    """
 
     plain_name: str
     number: int
@@ -67,6 +71,7 @@ class NanoEntry:
     start: int
     packed: int
     size: int
+    before: int = 0
 
     @property
     def name(self) -> str:
@@ -75,7 +80,7 @@ class NanoEntry:
 
     def bytes_of(self, stream: VdbStream) -> GridBytes:
         """Its bytes, unpacked as they are read."""
-        return GridBytes(stream, self.codec, self.start, self.packed, self.size)
+        return GridBytes(stream, self.codec, self.start, self.packed, self.size, self.before)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,8 +119,10 @@ def _is_bare(stream: VdbStream) -> bool:
     magic = stream.take(min(8, stream.end - at))
     bare = magic == MAGIC_GRID
     if magic == MAGIC and stream.end - at >= GRID_BYTES:
-        stream.seek(at + GRID_BYTES - 8)
-        bare = stream.take(8) == MAGIC_GRID
+        stream.seek(at)
+        header = stream.take(GRID_BYTES)
+        segment, grid = (struct.unpack_from("<I", header, place)[0] >> 21 for place in (8, 16))
+        bare = header[-8:] == MAGIC_GRID or (segment != MAJOR_VERSION and grid == MAJOR_VERSION)
     stream.seek(at)
     return bare
 
@@ -157,9 +164,38 @@ def _segment(stream: VdbStream, entries: list[NanoEntry]) -> int:
             stream.fail(f"grid {name!r} says that it takes {packed} bytes, {stream.end - at} are left")
         if size > MOST_RATIO * packed or (codec == NONE and size != packed):
             stream.fail(f"grid {name!r} says that {packed} bytes of the file hold {size}")
-        entries.append(NanoEntry(name, _alike(entries, name), codec, at, packed, size))
+        whole = GridBytes(stream, codec, at, packed, size)
+        before = 0
+        for one, length in _packed_together(whole, name):
+            entries.append(NanoEntry(one, _alike(entries, one), codec, at, packed, length, before))
+            before += length
+        whole.release()
         at += packed
     return int(at)
+
+
+def _packed_together(whole: GridBytes, name: str) -> list[tuple[str, int]]:
+    """Names and sizes of the grids that a segment has as one.
+
+    Writers of versions up to 32.4 put all grids of a handle there: their headers tell how many there are.
+    """
+    found = [(name, whole.size)]
+    try:
+        header = whole.take(0, GRID_BYTES)
+    except VolumeError:  # as whoever reads it will say
+        return found
+    count, size = struct.unpack_from("<I", header, 28)[0], struct.unpack_from("<Q", header, 32)[0]
+    if header[:8] not in (MAGIC, MAGIC_GRID) or count < 2 or not GRID_BYTES <= size < whole.size:
+        return found
+    found, at = [(name, size)], size
+    while len(found) < count and whole.size - at >= GRID_BYTES:
+        header = whole.take(at, GRID_BYTES)
+        (size,) = struct.unpack_from("<Q", header, 32)
+        if header[:8] not in (MAGIC, MAGIC_GRID) or not GRID_BYTES <= size <= whole.size - at:
+            whole.fail(f"grid {len(found)} of {count} that are packed together is none")
+        found.append((_text(header[40:296]), size))
+        at += size
+    return found
 
 
 def _with_its_size(stream: VdbStream, at: int, packed: int, codec: int) -> int:

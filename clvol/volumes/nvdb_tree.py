@@ -114,8 +114,7 @@ class NanoTree(SparseParts):
     def _values(self, raw: np.ndarray) -> np.ndarray:
         """What bytes, uint8 (n, at least a value's), begin with: float32 (n, channels)."""
         stored = np.ascontiguousarray(raw[:, : self.kind.value.itemsize * self.channels])
-        with np.errstate(over="ignore", invalid="ignore"):
-            return stored.view(self.kind.value).astype(np.float32)
+        return self.narrowed(stored.view(self.kind.value))
 
     def _next_level(
         self, origins: np.ndarray, parents: np.ndarray, child: np.ndarray, sizes: tuple[int, int]
@@ -154,8 +153,7 @@ class NanoTree(SparseParts):
         if self.kind.quantised:
             return _dequantised(leaves, stored, self.kind.bits)
         numbers = stored[:, : 512 * self.channels * self.kind.value.itemsize].view(self.kind.value)
-        with np.errstate(over="ignore", invalid="ignore"):
-            return numbers.astype(np.float32)
+        return self.narrowed(numbers)
 
     def _adaptive_leaves(self, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Of leaves that say how many bits their values have: their heads, and values float32 (n, 512)."""

@@ -11,6 +11,7 @@ import numpy as np
 from clvol.errors import VolumeError
 from clvol.volumes.files import MAX_BYTES, allocate, place
 from clvol.volumes.grid import DenseGrid
+from clvol.volumes.narrowing import Narrowing
 from clvol.volumes.numpy_files import check_layout
 
 if TYPE_CHECKING:
@@ -168,9 +169,10 @@ def samples(
     """
     check_layout(dtype, tuple(shape), where)
     check_size(shape, where)
-    values = allocate(tuple(shape), np.float32, where)
+    values, narrowed = allocate(tuple(shape), np.float32, where), Narrowing(where)
     planes = max(SLAB // (dtype.itemsize * max(math.prod(shape[1:]), 1)), 1)
     for first in range(0, shape[0], planes):
-        with np.errstate(over="ignore", invalid="ignore"):
-            values[first : first + planes] = read(slice(first, min(first + planes, shape[0])))
+        part = np.asarray(read(slice(first, min(first + planes, shape[0]))))
+        values[first : first + planes] = narrowed(part)
+    narrowed.check()
     return values[..., None] if values.ndim == 3 else values

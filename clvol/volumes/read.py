@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from clvol.base.files import other_kind
+from clvol.base.kinds import kind_of_file
 from clvol.errors import VolumeError
 from clvol.volumes import containers, itk, tiff, vti
 from clvol.volumes.files import open_binary
@@ -121,6 +122,9 @@ def read_volume(path: str | os.PathLike[str], grid: str | None = None) -> Grid:
             raise VolumeError(
                 f"is {kind}, not a volume file", str(path), f"give a file: {listed} can be read"
             )
+        what, hint = kind_of_file(path)
+        if what:
+            raise VolumeError(f"is {what}, not a volume", str(path), hint or f"volumes are {listed}")
         what = f"files ending in {suffix!r}" if suffix else "files without a suffix"
         raise VolumeError(f"{what} cannot be read, {listed} can", str(path))
     return READERS[suffix](path, grid)

@@ -9,6 +9,7 @@ import numpy as np
 from clvol.volumes.brick_tree import MOST_EXTENT, PRUNE
 from clvol.volumes.files import allocate
 from clvol.volumes.grid import SparseGrid
+from clvol.volumes.narrowing import Narrowing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -54,6 +55,7 @@ class SparseParts:
 
     def __init__(self, stream: VdbStream, channels: int, max_bytes: int) -> None:
         self.stream, self.channels, self.max_bytes = stream, channels, max_bytes
+        self.narrowed = Narrowing(stream.where)
         self.leaf_count = self.tile_count = 0
         self._leaf_origins: list[np.ndarray] = []
         self._tiles: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = []
@@ -77,8 +79,7 @@ class SparseParts:
 
     def set_background(self, stored: float | Sequence[float] | np.ndarray) -> None:
         """Keep the value outside of leaves and tiles, which must be finite, as float32."""
-        with np.errstate(over="ignore"):
-            self.background = np.array(stored, np.float64).reshape(self.channels).astype(np.float32)
+        self.background = self.narrowed(np.array(stored, np.float64).reshape(self.channels))
         if not np.isfinite(self.background).all():
             self.fail(f"the background is {', '.join(map(str, np.ravel(stored)))}")
 
@@ -160,6 +161,7 @@ class SparseParts:
 
     def grid(self, index_to_world: np.ndarray, kind: str, name: str, source: str) -> SparseGrid:
         """What was read."""
+        self.narrowed.check()
         return SparseGrid(
             leaf_origins=self.leaf_origins,
             leaf_values=self.leaf_values,

@@ -18,6 +18,7 @@ from clvol.volumes.sparse_parts import (
 from clvol.volumes.vdb_stream import ACTIVE_MASK
 
 if TYPE_CHECKING:
+    from clvol.volumes.narrowing import Narrowing
     from clvol.volumes.vdb_stream import VdbStream
 
 # Leaves decoded at once: large enough for NumPy, small enough to stay in the cache.
@@ -63,7 +64,7 @@ class NodeValues:
     Parameters
     ----------
     value : the tree's type.  half : the blocks hold 16-bit floats.  compression : flags of the grid.
-    background : the tree's, in its own type.
+    background : the tree's, in its own type.  narrowed : makes float32 of all values of the tree.
     """
 
     def __init__(
@@ -73,7 +74,9 @@ class NodeValues:
         half: bool,
         compression: int,
         background: tuple[float, ...],
+        narrowed: Narrowing,
     ) -> None:
+        self.narrowed = narrowed
         self.stream, self.value, self.half, self.compression = stream, value, half, compression
         self.stored_type = np.dtype("<e" if half else "<" + value.code)
         self.background = background
@@ -112,12 +115,10 @@ class NodeValues:
         )
         packed = np.array([n.packed for n in nodes])
         payload = np.frombuffer(b"".join(n.payload for n in nodes), self.stored_type)
-        # A double beyond float32 becomes infinite, and is reported as such when the values are checked.
-        with np.errstate(over="ignore", invalid="ignore"):
-            inactive = np.array([n.inactive for n in nodes], np.float64).astype(np.float32)
-            first, second = np.moveaxis(inactive.view(element)[..., 0], 1, 0)[..., None]
-            values = np.where(selection, second, first)
-            values[mask_bits(masks) | ~packed[:, None]] = payload.astype(np.float32).view(element)
+        inactive = self.narrowed(np.array([n.inactive for n in nodes], np.float64))
+        first, second = np.moveaxis(inactive.view(element)[..., 0], 1, 0)[..., None]
+        values = np.where(selection, second, first)
+        values[mask_bits(masks) | ~packed[:, None]] = self.narrowed(payload).view(element)
         expanded: np.ndarray = values.view(np.float32).reshape(*values.shape, channels)
         return expanded
 
@@ -150,7 +151,8 @@ class VdbTree(SparseParts):
             stream.fail(f"the tree has {buffers} buffers, 1 is expected")
         background = stream.unpack(self.value.layout)
         self.set_background(background)
-        self.nodes = NodeValues(stream, self.value, self.half, self.compression, background)
+        storage = self.value, self.half, self.compression
+        self.nodes = NodeValues(stream, *storage, background, self.narrowed)
         tiles, children = stream.unpack("<II")
         self.read_root_tiles(tiles)
         stream.require(children * 12)
@@ -166,9 +168,7 @@ class VdbTree(SparseParts):
         self.stream.require(count * record.itemsize)
         self.claim(0, count)
         table = np.frombuffer(self.stream.take(count * record.itemsize), record)
-        with np.errstate(over="ignore"):
-            values = table["value"].astype(np.float32)
-        self.add_root_tiles(table["origin"], values, table["active"])
+        self.add_root_tiles(table["origin"], self.narrowed(table["value"]), table["active"])
 
     def read_internal(self, origin: np.ndarray, child_edge: int) -> None:
         """An internal node: its tiles and its children; the leaves' masks come again with their values."""

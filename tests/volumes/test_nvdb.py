@@ -6,12 +6,23 @@ The files of cases/nvdb are NanoVDB's (32.4.2), and the values that it finds in 
 from __future__ import annotations
 
 import os
+import struct
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from nvdb_writer import BLOSC, LAYOUTS, NONE, ZIP, grid_bytes, stored_values, version_number, write_nvdb
+from nvdb_writer import (
+    BLOSC,
+    LAYOUTS,
+    NONE,
+    ZIP,
+    grid_bytes,
+    packed,
+    stored_values,
+    version_number,
+    write_nvdb,
+)
 from places import CASES
 from rich_vdb import as_vectors, rich_grid
 from vdb_writer import GridSpec, write_vdb
@@ -132,6 +143,30 @@ def test_bare_grids_one_after_the_other(tmp_path, magic):
     (tmp_path / "a.nvdb").write_bytes(b"".join(grids))
     assert [info.name for info in list_nvdb(tmp_path / "a.nvdb")] == ["density", "heat"]
     assert_holds(read_nvdb(tmp_path / "a.nvdb", "heat"), specs[1], "Float")
+
+
+@pytest.mark.parametrize("codec", [NONE, ZIP, BLOSC])
+def test_grids_of_one_handle_are_all_found_where_they_are_packed_together(tmp_path, codec):
+    """As NanoVDB 32.4 and before wrote a handle of several: a segment with one grid, which holds all."""
+    specs = [replace(rich("Float"), name=name, background=10 + n) for n, name in enumerate("abb")]
+    grids = [bytearray(grid_bytes(spec, "Float")) for spec in specs]
+    for number, grid in enumerate(grids):
+        struct.pack_into("<2I", grid, 24, number, len(grids))
+    whole, path = b"".join(grids), tmp_path / "a.nvdb"
+    written = write_nvdb(path, specs[:1], codec=codec)
+    head = bytearray(written[: written.index(b"a\0") + 2])
+    struct.pack_into("<2Q", head, 16, len(whole), len(packed(whole, codec)))
+    for data in (bytes(head) + packed(whole, codec), whole):
+        path.write_bytes(data)
+        assert [info.name for info in list_nvdb(path)] == ["a", "b", "b[1]"]
+        for number, spec in enumerate(specs):
+            assert_holds(read_nvdb(path, number), spec, "Float")
+    struct.pack_into("<Q", grids[1], 32, len(whole))
+    damaged = packed(b"".join(grids), codec)
+    struct.pack_into("<Q", head, 24, len(damaged))
+    path.write_bytes(bytes(head) + damaged)
+    with pytest.raises(VolumeError, match="grid 1 of 3 that are packed together is none"):
+        list_nvdb(path)
 
 
 def test_grids_are_found_by_name_and_number_in_all_segments(tmp_path, caplog):

@@ -423,9 +423,29 @@ def test_a_vdb_without_active_voxels_is_empty(tmp_path):
         refuses(lambda g=grid: check_coefficients(g), "density has no active voxels", path)
 
 
-def test_doubles_beyond_float32_are_reported_as_infinite(tmp_path):
+BEYOND, NOTHING = r"up to 1e\+300, beyond single precision", "no value above 1e-300, which is 0 in single"
+
+
+@pytest.mark.parametrize(("value", "message"), [(1e300, BEYOND), (1e-300, NOTHING)])
+def test_doubles_that_no_float32_is_are_told_from_nan_and_from_nothing(tmp_path, value, message):
     path = tmp_path / "a.vdb"
-    grid = sparse(path, value_type="double", tiles=[((8, 0, 0), 8, 1e300, True)])
-    refuses(lambda: check_coefficients(grid), "1 NaN or infinite", path)
-    np.save(tmp_path / "a.npy", np.full((1, 1, 2), 1e300))
-    refuses(lambda: check_coefficients(read_numpy(tmp_path / "a.npy")), "2 NaN or infinite", tmp_path)
+    refuses(lambda: sparse(path, value_type="double", tiles=[((8, 0, 0), 8, value, True)]), message, path)
+    leaves = {(8, 0, 0): (np.full((8, 8, 8), value), np.ones((8, 8, 8), bool))}
+    refuses(lambda: sparse(path, value_type="double", leaves=leaves), message, path)
+    for order in "CF":
+        np.save(tmp_path / "a.npy", np.full((1, 1, 2), value, order=order))
+        refuses(lambda: read_numpy(tmp_path / "a.npy"), message, tmp_path)
+    array = np.full((2, 3, 4), value)
+    refuses(lambda: dense_from_array(array, source="a"), message, "a")
+    refuses(lambda: dense_from_array(np.ma.masked_less(array, 0), source="a"), message, "a")
+
+
+def test_beside_others_tiny_doubles_are_0_and_infinite_ones_are_counted():
+    grid = dense_from_array(np.array([[[1.0, 1e-300, 0.0]]]))
+    np.testing.assert_array_equal(grid.values.reshape(-1), [1, 0, 0])
+    assert not dense_from_array(np.zeros((1, 1, 2))).values.any()
+    infinite = dense_from_array(np.array([[[1.0, np.inf, np.nan]]]))
+    with pytest.raises(VolumeError, match="2 NaN or infinite of 3"):
+        check_coefficients(infinite)
+    with pytest.raises(VolumeError, match="which is 0 in single precision"):
+        check_coefficients(dense_from_array(np.full((1, 1, 2), 1e-40, np.float32)))
