@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from clvol.api.renders import plan
 from clvol.device.device import list_devices
-from clvol.errors import DeviceError, OptionError, printable, shown
+from clvol.errors import DeviceError, OptionError, Told, printable, shown
 from clvol.picture.loading import load_result
 from clvol.picture.result import Result
 from clvol.planning.in_force import warnings
@@ -120,7 +120,7 @@ def scene_lines(scene: Scene, choices: dict[str, Any]) -> list[str]:
         lines = [f"note: cannot be rendered as it is: {refused}"]  # by its own choices
     else:
         asked = {family: choices.get(family, "auto") for family in FAMILIES}
-        lines = [*planned.describe(), *(f"note: {warning}" for warning in warnings(planned, asked))]
+        lines = [*planned.describe(), *(Told(f"note: {warning.marked}") for warning in warnings(planned, asked))]
     return [*describe_scene(scene), "", *lines]
 
 

@@ -14,7 +14,7 @@ from clvol.api.resuming import check_same, resumable, what_is_left
 from clvol.base.arguments import check_seed, flag, positive
 from clvol.base.progress import Glance, Progress
 from clvol.device.device import open_device
-from clvol.errors import OptionError, shown
+from clvol.errors import OptionError, either, option, shown
 from clvol.picture.denoising import FEATURES, need_denoiser
 from clvol.picture.merging import merge
 from clvol.planning import registry
@@ -95,7 +95,10 @@ class Order:
         if piloted:
             choices = choices.but(technique="auto")  # the scene's own technique too is put to the test
         if choices.target_error is not None and given["samples"] is not None:
-            raise OptionError("target_error and samples exclude each other", hint="spp says how many at most")
+            raise OptionError(
+                f"{option('target_error')} and {option('samples')} exclude each other",
+                hint=f"{option('spp')} says how many at most",
+            )
         denoise = _denoises(given["denoise"])
         spp, time_limit = given["spp"], given["time_limit"]
         first, count = _sample_range(scene, spp, time_limit, given["samples"])
@@ -246,12 +249,15 @@ def _sample_range(
 ) -> tuple[int, int]:
     """First sample and how many; a time limit alone sets no end."""
     if samples is not None and spp is not None:
-        raise OptionError("spp and samples exclude each other", hint="samples=(first, count) says both")
+        hint = f"{either('samples=(first, count)', '--samples FIRST,COUNT')} says both"
+        raise OptionError(f"{option('spp')} and {option('samples')} exclude each other", hint=hint)
     if time_limit is not None and not (isinstance(time_limit, float) and time_limit == math.inf):
         positive("time limit ", time_limit, " of seconds")
     if samples is not None:
         if not isinstance(samples, tuple | list) or len(samples) != 2:
-            raise OptionError(f"samples={shown(samples)} is not a pair", hint="give (first, count)")
+            raise OptionError(
+                f"{option('samples')} {shown(samples)} is not a pair", hint="give (first, count)"
+            )
         first, count = samples
     elif time_limit is not None and spp is None:
         first, count = 0, MAX_SAMPLES

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.errors import OptionError
+from clvol.errors import OptionError, either, option
 from clvol.picture.estimate import Uneven
 from clvol.picture.loading import load_result
 from clvol.picture.merging import differences
@@ -28,13 +28,19 @@ def resumable(
 ) -> Result:
     """The picture to go on from; OptionError where none can go on from it, or other options say otherwise."""
     if piloted:
-        raise OptionError("resume goes on with the choices of a picture", hint="leave auto:pilot out")
+        raise OptionError(
+            f"{option('resume')} goes on with the choices of a picture", hint="leave auto:pilot out"
+        )
     if target_error is not None:
         raise OptionError(
-            "a picture to a target error cannot go on from another", hint="give spp or a time limit instead"
+            "a picture to a target error cannot go on from another",
+            hint=f"give {option('spp')} or {option('time_limit')} instead",
         )
     if samples is not None:
-        raise OptionError("resume and samples exclude each other", hint="spp says how many there are to be")
+        raise OptionError(
+            f"{option('resume')} and {option('samples')} exclude each other",
+            hint=f"{option('spp')} says how many there are to be",
+        )
     result = given if isinstance(given, Result) else load_result(given)
     if isinstance(result.estimate, Uneven):
         reason, hint = result.estimate.reason, result.estimate.hint
@@ -63,11 +69,12 @@ def check_same(result: Result, session: Session) -> None:
     for key in sorted(found, key=lambda key: (key not in _FIRST, key)):
         theirs, ours = found[key]
         if key == "digest":
+            values = either("values of its defaults", "-D values")
             source = result.metadata.get("scene") or "a scene from Python"
             raise OptionError(
                 f"cannot go on from a picture of another scene: that of {source} is not this one",
-                hint="the scene, its files, -D values or the sensor changed: render it anew",
+                hint=f"the scene, its files, {values} or the sensor changed: render it anew",
             )
         what = f"cannot go on from a picture of another {key}: {theirs!r}, not {ours!r}"
-        instead = "" if theirs is None else f"give {key} {theirs}, or "
+        instead = "" if theirs is None else f"give {option(key, theirs)}, or "
         raise OptionError(what, hint=f"{instead}render anew")

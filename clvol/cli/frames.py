@@ -160,7 +160,8 @@ class Series:
                 except DeviceError:
                     raise
                 except (Error, OSError, MemoryError) as error:
-                    failures[frame] = str(error) or "out of memory"
+                    said = error.told(command=True) if isinstance(error, Error) else str(error)
+                    failures[frame] = said or "out of memory"
                     mention([f"clvol: frame {frame.number} failed: {failures[frame]}"], err=True)
         self._tell(failures, skipped, interrupted)
         if failures and not interrupted:

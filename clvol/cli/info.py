@@ -15,7 +15,7 @@ from clvol.cli.options import (
     majorant_scale_option,
     step_option,
 )
-from clvol.errors import printable
+from clvol.errors import printable, spelled_out
 
 EXAMPLES = """
 \b
@@ -68,4 +68,5 @@ def _tell_scene(file: str, definitions: dict[str, str], choices: dict[str, Any])
     import clvol
     from clvol.api.about import scene_lines
 
-    tell(map(printable, scene_lines(clvol.load_file(file, **definitions), choices)))
+    lines = scene_lines(clvol.load_file(file, **definitions), choices)
+    tell(printable(spelled_out(line, command=True)) for line in lines)

@@ -7,12 +7,13 @@ import logging
 import os
 import sys
 from contextlib import contextmanager, suppress
+from copy import copy
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
 from clvol.base.interrupts import ENDING, interruptible
-from clvol.errors import DeviceError, Error, printable, shortened
+from clvol.errors import DeviceError, Error, Told, printable, shortened, spelled_out
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -48,9 +49,9 @@ class OneLineErrors(click.Group):
             except click.ClickException as error:
                 fail(error.format_message())
             except DeviceError as error:
-                fail(str(error), whole=True)
+                fail(error.told(command=True), whole=True)
             except Error as error:
-                fail(str(error))
+                fail(error.told(command=True))
             except OSError as error:
                 fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
             except MemoryError as error:
@@ -95,6 +96,11 @@ def _usage_message(error: click.UsageError) -> str:
     return f"{message[:1].lower()}{message[1:]}; see {command} --help"
 
 
+def _as_typed(part: object) -> object:
+    """A part of a message in the words of the command line, where it has such."""
+    return spelled_out(part, command=True) if isinstance(part, Told) else part
+
+
 @contextmanager
 def logging_to(console: Console, verbose: bool) -> Iterator[None]:
     """Print clvol's log on the console, beside a progress bar too: warnings, and the plan with `verbose`."""
@@ -102,7 +108,10 @@ def logging_to(console: Console, verbose: bool) -> Iterator[None]:
     class ConsoleHandler(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
             prefix = f"clvol: {record.levelname.lower()}: " if record.levelno >= logging.WARNING else ""
-            line = printable(prefix + self.format(record))
+            arguments = tuple(map(_as_typed, record.args)) if isinstance(record.args, tuple) else record.args
+            said = copy(record)
+            said.msg, said.args = _as_typed(record.msg), arguments
+            line = printable(prefix + self.format(said))
             console.print(line, markup=False, highlight=False, emoji=False, soft_wrap=True)
 
     logger, handler = logging.getLogger("clvol"), ConsoleHandler()

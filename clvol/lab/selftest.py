@@ -21,7 +21,7 @@ import numpy as np
 
 from clvol.base.arguments import check_seed, flag, positive, whole
 from clvol.device.device import Device, open_device
-from clvol.errors import OptionError, shown
+from clvol.errors import OptionError, option, shown
 from clvol.lab.combinations import (
     LIGHTS,
     biased,
@@ -118,7 +118,7 @@ def selftest(
         positive("", seconds, " of seconds")
     seed = check_seed(seed)
     if spp is not None and not 1 <= whole("spp", spp) <= MAX_SAMPLES:
-        raise OptionError(f"spp={spp} cannot be rendered", hint=f"give 1 to {MAX_SAMPLES}")
+        raise OptionError(f"{option('spp', spp)} cannot be rendered", hint=f"give 1 to {MAX_SAMPLES}")
     effort = QUICK if flag("quick", quick) else FULL
     tell = progress or (lambda what, done, total: None)
     small, opened = reduced(scene, effort.pixels), open_device(device)

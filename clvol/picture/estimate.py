@@ -15,7 +15,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from clvol.errors import OptionError
+from clvol.errors import OptionError, option
 
 Ranges = tuple[tuple[int, int], ...]
 """Sample ranges as (first, count), ascending, disjoint, not touching."""
@@ -153,8 +153,8 @@ class Uneven:
     variance: np.ndarray
     counts: np.ndarray
     dof: int
-    reason: str = "results of a target_error do not merge"
-    hint: str = "ask for a lower target_error, or render sample ranges without one"
+    reason: str = "results of a target error do not merge"
+    hint: str = f"ask for a lower {option('target_error')}, or render ranges of samples without one"
 
     def mean_and_variance(self) -> tuple[np.ndarray, np.ndarray]:
         """As they are."""

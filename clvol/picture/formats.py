@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.base.output_files import output_suffix
-from clvol.errors import OptionError, shown
+from clvol.errors import OptionError, option, shown
 
 if TYPE_CHECKING:
     from clvol.base.output_files import StrPath
@@ -82,7 +82,7 @@ def check_component(suffix: str, asked: str) -> None:
     """OptionError where such a file cannot hold these numbers."""
     if not isinstance(asked, str) or asked not in COMPONENTS:
         hint = f"choose among {', '.join(COMPONENTS)}"
-        raise OptionError(f"unknown component_format {shown(asked)}", hint=hint)
+        raise OptionError(f"unknown {option('component_format')} {shown(asked)}", hint=hint)
     known = FORMATS[suffix].components
     if asked not in known:
         holding = [other for other, form in FORMATS.items() if asked in form.components]

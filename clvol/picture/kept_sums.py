@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from clvol.errors import option
 from clvol.picture.estimate import Estimate, Moments, Replicates, Uneven
 from clvol.picture.image_io import HALVED
 
@@ -80,10 +81,13 @@ def rebuilt(
     counts = np.zeros(mean.shape[:2]) if samples is None else np.rint(samples)
     whole = mean64, variance64, counts.astype(np.int64).reshape(-1), _count(said["dof"], least=-1)
     if said["kind"] == "half":
-        return Uneven(*whole, reason=_HALF, hint="save as .exr with component_format float32")
+        return Uneven(*whole, reason=_HALF, hint=_IN_FULL)
     if said["kind"] != "uneven" or samples is None:
         raise ValueError("unknown kind of sums")
     return Uneven(*whole, str(said["reason"]), str(said["hint"]))
+
+
+_IN_FULL = f"save as .exr with {option('component_format', 'float32')}"
 
 
 def _replicates(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clvol.base.arguments import listed
-from clvol.errors import OptionError, shown
+from clvol.errors import OptionError, either, shown
 from clvol.picture.estimate import Uneven
 from clvol.picture.result import Result, said_ranges
 
@@ -124,10 +124,11 @@ def _joined(spans: Sequence[tuple[int, int]]) -> Ranges:
     joined: list[tuple[int, int]] = []
     for first, count in sorted(spans):
         if joined and first < sum(joined[-1]):
+            ranges = either("samples=(first, count)", "--samples FIRST,COUNT")
             raise OptionError(
                 f"cannot merge overlapping samples: {first} to {min(sum(joined[-1]), first + count) - 1} "
                 "occur twice",
-                hint="render disjoint ranges with samples=(first, count)",
+                hint=f"render disjoint ranges with {ranges}",
             )
         if joined and first == sum(joined[-1]):
             joined[-1] = (joined[-1][0], joined[-1][1] + count)

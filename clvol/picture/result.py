@@ -292,9 +292,9 @@ class Result:
             as on a full disk: the picture is then kept where the message says.
         """
         view = View(exposure, display, view_transform)
-        check_spares(path, self.files)
         size = self.image.shape[1], self.image.shape[0]
         check_picture(path, view, component_format, alpha=self.alpha is not None, size=size)
+        check_spares(path, self.files)
         for failure in save_all(lambda s: encode_result(self, s, view, component_format), [path]).values():
             raise failure
 

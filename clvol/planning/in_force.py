@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from clvol.errors import Told, either, option
 from clvol.planning import registry
 from clvol.planning.lanes import against
 from clvol.planning.names import Names
@@ -102,27 +103,32 @@ def _instead(plan: Decisions, family: str, used: str) -> str:
     return f" is not used: the scene's media need only the {used} rule"
 
 
-def warnings(plan: Decisions, asked: Mapping[str, str]) -> Iterator[str]:
+def warnings(plan: Decisions, asked: Mapping[str, str]) -> Iterator[Told]:
     """What a user should hear of: own choices that are not used, a picture left black, biased or too noisy.
 
     Parameters
     ----------
     asked : names by family that the caller gave, "auto" included.
     """
+    yield from map(Told, _warnings(plan, asked))
+
+
+def _warnings(plan: Decisions, asked: Mapping[str, str]) -> Iterator[str]:
     used, features = used_names(plan), plan.features
     for family, value in asked.items():
         if family == "lanes":
             continue  # where no walk goes in lanes, numbers are drawn in them: the same as one by one
         if value not in ("auto", used[family]):
-            yield f"{family} {value}{_instead(plan, family, used[family])}"
+            asked_for = either(f"{family} {value}", f"{registry.option(family)} {value}")
+            yield f"{asked_for}{_instead(plan, family, used[family])}"
     if plan.choices.majorant_scale != 1 and used["majorant"] == "none":
-        yield "majorant_scale is not used: nothing in this render walks a majorant"
+        yield f"{option('majorant_scale')} is not used: nothing in this render walks a majorant"
     if not features.emitters and not features.emission:
         yield "the scene has no emitter: its picture is black"
     if features.alpha and plan.opaque:
         yield (
-            "alpha is 1 everywhere, since the environment is seen: hide_emitters or background transparent "
-            "leave it out"
+            "alpha is 1 everywhere, since the environment is seen: hide_emitters, or "
+            f"{option('background', 'transparent')}, leaves it out"
         )
     if plan.settled is not None and plan.mixes_far_channels:
         yield (

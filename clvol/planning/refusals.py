@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from clvol.errors import OptionError
+from clvol.errors import OptionError, option
 from clvol.planning import registry
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def refuse_impossible(features: Features, choices: Choices, chosen: Mapping[str,
     if choices.step is not None and not marches:
         raise OptionError(
             "step is for ray marching, and nothing marches here",
-            hint="choose technique or transmittance marching",
+            hint=f"choose {option('technique', 'marching')} or {option('transmittance', 'marching')}",
         )
     if not features.heterogeneous:
         return  # closed forms take the place of every technique and transmittance
@@ -37,12 +37,13 @@ def refuse_impossible(features: Features, choices: Choices, chosen: Mapping[str,
     if features.interpolated_transfers and chosen["lookup"] == "stochastic":
         raise OptionError(
             "stochastic look-ups would bias a transfer function, which classifies interpolated values",
-            hint="use lookup exact, or a volume with filter_type nearest",
+            hint=f"use {option('lookup', 'exact')}, or a volume with filter_type nearest",
         )
     for family, name, choice, instead in used:
         if choices.majorant_scale < 1 and choice.needs_bound:
             raise OptionError(
-                f"{family} {name!r} is biased where bounds are too low, as by a majorant_scale below 1",
+                f"{family} {name!r} is biased where bounds are too low, as by {option('majorant_scale')} "
+                "below 1",
                 hint=f"use one that carries weights, such as {instead}",
             )
         if features.interpolated_transfers and choice.interpolated:
@@ -54,7 +55,7 @@ def refuse_impossible(features: Features, choices: Choices, chosen: Mapping[str,
         if chosen["lookup"] == "stochastic" and not choice.linear:
             raise OptionError(
                 f"stochastic look-ups would bias {family} {name!r}, which is not linear in the density",
-                hint="use lookup exact",
+                hint=f"use {option('lookup', 'exact')}",
             )
 
 

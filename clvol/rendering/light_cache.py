@@ -10,6 +10,7 @@ import pyopencl as cl
 from clvol.device.launch import GROUP, run_kernel, scene_arguments, whole
 from clvol.device.programs import BUILD_OPTIONS, build, light_cache_source
 from clvol.device.side_builds import Launch, Unit
+from clvol.errors import option
 from clvol.tables.light_cache import SKY_DIRECTIONS, light_cache_record, rows, typical_radiance
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from clvol.device.device import Device
     from clvol.tables.prepare import PreparedScene
 
-_PURPOSE = "the cache of lights", "choose shadow_cache off"
+_PURPOSE = "the cache of lights", f"choose {option('shadow_cache', 'off')}"
 
 
 def light_cache_unit(prepared: PreparedScene) -> Unit:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clvol import layout
+from clvol.errors import Told, option
 from clvol.picture.result import Result, said_ranges
 from clvol.planning import registry
 from clvol.rendering.labels import scenery_of
@@ -245,7 +246,10 @@ def _warn(session: Session, stats: dict[str, Any]) -> None:
         )
     if stats["largest_weight"] > LARGE_WEIGHT:
         log.warning(
-            "weights grew to %.2g: the picture is noisier than its variance says; raise majorant_scale, "
-            "use probability history, or a technique without weights",
+            Told(
+                "weights grew to %.2g: the picture is noisier than its variance says; raise "
+                f"{option('majorant_scale')}, use {option('probability', 'history')}, or a technique without "
+                "weights"
+            ),
             stats["largest_weight"],
         )

@@ -14,7 +14,7 @@ from clvol import layout
 from clvol.base.arguments import check_seed
 from clvol.device.programs import build_stages, stage_units
 from clvol.device.side_builds import SideBuilds, Unit
-from clvol.errors import RenderError
+from clvol.errors import RenderError, option
 from clvol.planning.in_force import warnings
 from clvol.planning.plan import Plan
 from clvol.planning.settled import Tuning
@@ -225,7 +225,7 @@ def nothing_finished(urgency: int) -> BaseException:
         return KeyboardInterrupt()
     return RenderError(
         "the render was to end, but its first samples did not: paths in flight go on for very long",
-        hint="limit them with max_depth, lower majorant_scale or the density, or give more time",
+        hint=f"limit them with max_depth, lower {option('majorant_scale')} or the density, or give more time",
     )
 
 

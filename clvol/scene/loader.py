@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from clvol.base.files import files_noted
-from clvol.errors import SceneError, shown
+from clvol.errors import Error, SceneError, shown
 from clvol.scene import bsdf, classified, emitter, integrator, medium, phase, sensor, shape, texture, volume
 from clvol.scene.library import Grids, Library, PluginTable
 from clvol.scene.mesh_files import FORMATS
@@ -119,7 +119,7 @@ def load_file(path: str | Path, **defaults: object) -> Scene:
     """
     if not isinstance(path, str | os.PathLike):
         raise SceneError(f"load_file takes a file's name, not {shown(path)}", hint="load_dict takes dicts")
-    return _loaded(lambda: read_xml(Path(path), defaults), source=str(path))
+    return _of_xml(lambda: read_xml(Path(path), defaults), source=str(path))
 
 
 def load_string(text: str, **defaults: object) -> Scene:
@@ -146,7 +146,7 @@ def load_string(text: str, **defaults: object) -> Scene:
         raise SceneError(
             f"load_string takes a string of XML, not {shown(text)}", hint="load_dict takes dicts"
         )
-    return _loaded(lambda: read_xml_text(text, defaults))
+    return _of_xml(lambda: read_xml_text(text, defaults))
 
 
 def load_dict(scene: Mapping[str, object]) -> Scene:
@@ -193,6 +193,15 @@ def load_sensor(given: Mapping[str, object]) -> tuple[Sensor, set[str]]:
         raise SceneError(f"'{node.type}' is a {kind}, not a sensor", node.where)
     inside = (value for _, value in node.parameters() if isinstance(value, Node) and not value.is_value)
     return build(node, library), {library.kind_of(library.resolve(value)) for value in inside}
+
+
+def _of_xml(read: Callable[[], Node], source: str = "") -> Scene:
+    """As `_loaded`, where what is wrong is to be mended in XML."""
+    try:
+        return _loaded(read, source)
+    except Error as error:
+        error.in_scene = True
+        raise
 
 
 def _loaded(

@@ -209,7 +209,8 @@ def samples(channels: int, maximum: float, signed: bool) -> Check:
                 name,
                 "load a scene of its own for it",
             )
-        (check_finite if signed else check_coefficients)(grid, name.rpartition(".")[2])
+        verify = check_finite if signed else check_coefficients
+        verify(grid, name.rpartition(".")[2], mendable=False)
         largest = float(grid.values.max())
         if largest > maximum:
             raise SceneError(f"must be at most {maximum:g}, the samples reach {largest:.9g}", name)

@@ -15,7 +15,7 @@ import numpy as np
 
 from clvol.base.files import open_regular, other_kind
 from clvol.base.kinds import kind_of_file
-from clvol.errors import SceneError, shortened, shown
+from clvol.errors import SceneError, either, shortened, shown
 from clvol.scene import transforms
 from clvol.scene.files import find
 from clvol.scene.nodes import NAMELESS, Node
@@ -63,7 +63,8 @@ def read_xml(path: Path, keywords: Mapping[str, object]) -> Node:
     """
     if str(path).lstrip().startswith("<"):
         raise SceneError(
-            f"a file's name is wanted, got XML: '{shortened(str(path), 40)}'", hint="load_string takes XML"
+            f"a file's name is wanted, got XML: '{shortened(str(path), 40)}'",
+            hint=either("load_string takes XML", "save it as a file"),
         )
     if not os.path.isfile(path):  # false, unlike Path.is_file, for a name too long for the system
         if kind := other_kind(path):
@@ -71,7 +72,9 @@ def read_xml(path: Path, keywords: Mapping[str, object]) -> Node:
             raise SceneError(f"'{path}' is {kind}, not a scene file", hint=hint)
         raise SceneError(f"scene file '{path}' does not exist")
     if is_volume(path):
-        hint = "`clvol scene` makes a scene of it, `clvol render` a picture"
+        hint = either(
+            "volume_scene makes a scene of it", "`clvol scene` makes a scene of it, `clvol render` a picture"
+        )
         raise SceneError(f"'{path}' is a volume, not a scene", hint=hint)
     _check_xml(path)
     reader = _XmlReader(keywords)
@@ -85,7 +88,7 @@ def _check_xml(path: Path) -> None:
     what, hint = kind_of_file(path)
     if head.startswith(b"<") or (not what and path.suffix.lower() == ".xml"):
         return
-    known = f"scenes are Mitsuba's .xml, volumes {', '.join(SUFFIXES[:5])} and others: see clvol info --help"
+    known = f"scenes are Mitsuba's .xml, volumes {', '.join(SUFFIXES[:5])} and others"
     raise SceneError(
         f"is {what + ', ' if what else ''}neither a scene nor a volume", str(path), hint or known
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from clvol.errors import VolumeError
+from clvol.errors import VolumeError, either
 from clvol.volumes.grid import STAGGERED
 
 if TYPE_CHECKING:
@@ -98,7 +98,9 @@ def _remaining(
     if rest:
         names = ", ".join(map(repr, rest))
         raise VolumeError(
-            f"which of its grids is the density? It has {names}", where, "choose one as density"
+            f"which of its grids is the density? It has {names}",
+            where,
+            f"choose one by {either('density=', '--density ')}{rest[0]!r}",
         )
     reasons = [f"{grid.name!r}: {grid.unreadable}" for grid in listed if grid.unreadable]
     raise VolumeError("has no grid to render", where, "; ".join(reasons))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clvol.errors import OptionError, VolumeError
+from clvol.errors import OptionError, VolumeError, option
 from clvol.scene.reader import ROUNDING
 from clvol.scene.records import ConstVolume, GridVolume
 from clvol.staging.finding import IN_UNITS, Found, find_grids, plain
@@ -218,7 +218,7 @@ def _refuse_beside(look: Look, options: SimpleNamespace) -> None:
     for name in names:
         if getattr(options, name) not in (None, "none"):
             hint = "leave one of them out; a transfer's own colour and emission say how values look"
-            raise OptionError(f"a transfer function and {name} exclude each other", hint=hint)
+            raise OptionError(f"{option('transfer')} and {option(name)} exclude each other", hint=hint)
 
 
 def scanned(density: Field) -> Look | None:

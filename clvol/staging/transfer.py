@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clvol.base.extras import need
-from clvol.errors import OptionError, shown
+from clvol.errors import OptionError, either, shown
 from clvol.scene.loader import load_plugin
 from clvol.scene.records import GridVolume
 from clvol.scene.spectra import srgb_to_linear
@@ -90,7 +90,7 @@ def look_of(preset: str | None = None, opacity: Any = None, colour: Any = None, 
         if not isinstance(preset, str) or preset not in PRESETS:
             close = difflib.get_close_matches(str(preset)[:64], PRESETS, n=1)
             guess = f"did you mean '{close[0]}'? " if close else ""
-            hint = f"{guess}choose one of {', '.join(PRESETS)}, or give opacity"
+            hint = f"{guess}choose one of {', '.join(PRESETS)}{either(', or give opacity', '')}"
             raise OptionError(f"unknown transfer function {shown(preset)}", hint=hint)
         found = PRESETS[preset]
     elif opacity is None:

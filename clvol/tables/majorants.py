@@ -14,7 +14,7 @@ from clvol.accel.kdtree import KdTree, pack_maximum, unpack_maximum
 from clvol.accel.sparse_bounds import SparseBounds, from_dense, sparse_bounds
 from clvol.accel.sparse_grid import tree_grid
 from clvol.accel.sparse_kdtree import build_tree, finest_lattice
-from clvol.errors import SceneError
+from clvol.errors import SceneError, option
 from clvol.scene.medium_facts import is_homogeneous
 from clvol.volumes.bricks import BOUND_CELLS, BrickTree
 
@@ -150,7 +150,7 @@ def _check_range(one: _Walked, needs: MajorantNeeds) -> None:
     scale = float(np.max(one.medium.scale))
     largest = float(one.volume.peak(one.medium.transfer("sigma_t")).max())
     if largest * max(scale, 1.0) * max(needs.scale, 1.0) > float(np.finfo(np.float32).max):
-        factor = "" if needs.scale == 1 else f" and majorant_scale {needs.scale:g}"
+        factor = "" if needs.scale == 1 else f" and {option('majorant_scale', needs.scale)}"
         raise SceneError(
             f"sigma_t times scale {scale:g}{factor} is too large for a float",
             one.volume.volume.source or one.medium.name,

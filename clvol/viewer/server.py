@@ -187,7 +187,7 @@ class Server:
         try:
             wish = Wish.of(json.loads(await connection.receive_text()))
         except (Error, ValueError, RecursionError, KeyError) as error:
-            await connection.send_bytes(_message({"kind": "error", "text": str(error)}))
+            await connection.send_bytes(_message({"kind": "error", "text": _said(error)}))
         else:
             await asyncio.to_thread(self.painter.want, wish)
 
@@ -248,7 +248,7 @@ class Server:
             self._publish(self._encoded(painted))
 
     def _fail(self, error: Exception) -> None:
-        self._publish(_message({"kind": "error", "text": str(error) or "out of memory"}))
+        self._publish(_message({"kind": "error", "text": _said(error) or "out of memory"}))
 
     def _publish(self, message: bytes) -> None:
         """To all pages, from the thread that renders."""
@@ -284,3 +284,8 @@ def _message(said: dict[str, Any], picture: bytes = b"") -> bytes:
     """Length of what is said, that, and the picture."""
     words = json.dumps(said).encode()
     return struct.pack("<I", len(words)) + words + picture
+
+
+def _said(error: Exception) -> str:
+    """What is wrong, in the words of the command line, where whoever looks at the page came from."""
+    return error.told(command=True) if isinstance(error, Error) else str(error)

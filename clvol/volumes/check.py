@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.errors import VolumeError
+from clvol.errors import VolumeError, parameter
 from clvol.volumes.files import place
 from clvol.volumes.grid import LEVEL_SET, DenseGrid, Grid
 from clvol.volumes.narrowing import SMALLEST, vanishing
@@ -20,7 +20,7 @@ SLIGHT = 0.1
 """Negative samples down to so much of the greatest are slight: resampling with sharp filters leaves them."""
 
 
-def check_coefficients(grid: Grid, what: str = "density") -> None:
+def check_coefficients(grid: Grid, what: str = "density", mendable: bool = True) -> None:
     """Raise VolumeError unless every sample is finite and ≥ 0 and there is at least one.
 
     Parameters
@@ -28,16 +28,17 @@ def check_coefficients(grid: Grid, what: str = "density") -> None:
     grid : dense, or sparse with at least one active voxel; of a sparse one every voxel of the
         leaves (interpolation reads inactive ones too), the tiles and the background are checked.
     what : the coefficient the samples are used for, as the message names it.
+    mendable : whoever gives them can ask for `clvol.volumes.repair.sanitized`.
     """
-    _check(grid, what, signed=False)
+    _check(grid, what, False, mendable)
 
 
-def check_finite(grid: Grid, what: str) -> None:
+def check_finite(grid: Grid, what: str, mendable: bool = True) -> None:
     """As `check_coefficients`, but samples may be negative, as temperatures may."""
-    _check(grid, what, signed=True)
+    _check(grid, what, True, mendable)
 
 
-def _check(grid: Grid, what: str, signed: bool) -> None:
+def _check(grid: Grid, what: str, signed: bool, mendable: bool) -> None:
     where = place(grid.source, grid.name)
     if isinstance(grid, DenseGrid):
         if grid.values.size == 0:
@@ -48,7 +49,7 @@ def _check(grid: Grid, what: str, signed: bool) -> None:
         raise VolumeError(
             f"{what} is a level set: distances to a surface, not amounts of something",
             where,
-            'make a fog volume of it: level_set="fog"',
+            f"make a fog volume of it: {parameter('level_set', 'fog')}",
         )
     total = broken = negative = 0
     lowest = highest = 0.0
@@ -75,17 +76,16 @@ def _check(grid: Grid, what: str, signed: bool) -> None:
         raise VolumeError(
             f"{what} has {' and '.join(faults)} of {total} samples",
             where,
-            f"samples must be finite{'' if signed else ' and at least 0'}: repair or clamp the data, or "
-            f"give the volume sanitize=True{_what_sanitize_leaves(grid, lowest, signed)}",
+            f"samples must be finite{'' if signed else ' and at least 0'}: repair or clamp the data"
+            f"{_sanitize(grid, lowest, signed) if mendable else ''}",
         )
 
 
-def _what_sanitize_leaves(grid: Grid, lowest: float, signed: bool) -> str:
-    """What of a grid's faults `clvol.volumes.repair.sanitized` does not take as 0, for a hint."""
-    least = 0.0 - SLIGHT * greatest(grid)
-    left = ["infinite samples"] if any(np.isinf(slab).any() for slab in slabs(grid)) else []
-    left += [f"those below {least:.6g}"] if lowest < least and not signed else []
-    return f", which leaves {' and '.join(left)}" if left else ""
+def _sanitize(grid: Grid, lowest: float, signed: bool) -> str:
+    """The advice to take all that is wrong as 0, where `clvol.volumes.repair.sanitized` does; else ""."""
+    infinite = any(np.isinf(slab).any() for slab in slabs(grid))
+    low = not signed and lowest < -SLIGHT * greatest(grid)
+    return "" if infinite or low else f", or take them as 0: {parameter('sanitize', True)}"
 
 
 def greatest(grid: Grid) -> float:

@@ -22,7 +22,7 @@ import numpy as np
 
 from clvol.base.extras import need
 from clvol.base.files import note_file
-from clvol.errors import VolumeError
+from clvol.errors import GRID, VolumeError
 from clvol.volumes.files import CHUNK, TRUNCATED, open_binary
 from clvol.volumes.placed import Axis, check_size, part_of, placed_grid, samples, split_indices
 
@@ -149,7 +149,7 @@ def _series(sitk: Any, where: str, grid: str | None) -> str:
     listed = ", ".join(f"{n}: {identifier}" for n, identifier in enumerate(series))
     if grid is None:
         if len(series) > 1:
-            hint = f"name one as grid, by number or name: {listed}"
+            hint = f"name one by {GRID}, by number or name: {listed}"
             raise VolumeError(f"holds {len(series)} DICOM series", where, hint)
         return series[0]
     if grid in series:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from clvol.errors import VolumeError
+from clvol.errors import VolumeError, parameter
 from clvol.volumes.files import place
 from clvol.volumes.grid import FOG_VOLUME, LEVEL_SET, DenseGrid, Grid, SparseGrid
 from clvol.volumes.sparse_parts import active_box
@@ -26,10 +26,12 @@ def fog_of(grid: Grid) -> SparseGrid:
     """
     where = place(grid.source, grid.name)
     if isinstance(grid, DenseGrid):
-        raise VolumeError("is no level set of a .vdb or .nvdb file", where, "leave level_set out")
+        raise VolumeError(
+            "is no level set of a .vdb or .nvdb file", where, f"leave {parameter('level_set')} out"
+        )
     if grid.kind not in ("", LEVEL_SET) or grid.channels != 1:
         what = f"a {grid.kind}" if grid.kind else "a field of vectors"
-        raise VolumeError(f"is {what}, not a level set", where, "leave level_set out")
+        raise VolumeError(f"is {what}, not a level set", where, f"leave {parameter('level_set')} out")
     inside = grid.tile_values[:, 0] < 0
     least = np.fmin.reduce(grid.tile_values[inside], axis=None, initial=np.float32(0))
     if not least:

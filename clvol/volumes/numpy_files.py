@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from clvol.base.masks import as_array, masked_count
-from clvol.errors import VolumeError
+from clvol.errors import GRID, VolumeError
 from clvol.volumes.files import CHUNK, MAX_BYTES, TRUNCATED, allocate, fill, open_binary, place
 from clvol.volumes.grid import DenseGrid
 from clvol.volumes.narrowing import Narrowing
@@ -164,7 +164,7 @@ def _read_npz(
 def _choose_array(names: list[str], grid: str | None, where: str) -> str:
     listed = ", ".join(map(repr, names)) or "none"
     if grid is None and len(names) != 1:
-        raise VolumeError(f"holds {len(names)} arrays", where, f"name one as grid: {listed}")
+        raise VolumeError(f"holds {len(names)} arrays", where, f"name one by {GRID}: {listed}")
     if grid is not None and grid not in names:
         raise VolumeError(f"has no array {grid!r}", where, f"its arrays are {listed}")
     return names[0] if grid is None else grid
@@ -208,7 +208,7 @@ def _check_memory(nbytes: int, max_bytes: int, where: str) -> None:
         raise VolumeError(
             f"{nbytes} bytes of memory are needed, the limit is {max_bytes}",
             where,
-            "store it as a C-order float32 .npy, or raise max_bytes",
+            "store it as a C-order float32 .npy",
         )
 
 

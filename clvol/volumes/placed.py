@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from clvol.errors import VolumeError
+from clvol.errors import GRID, VolumeError
 from clvol.volumes.files import MAX_BYTES, allocate, place
 from clvol.volumes.grid import DenseGrid
 from clvol.volumes.narrowing import Narrowing
@@ -135,7 +135,9 @@ def part_of(
     if len(indices) != len(long):
         said = " x ".join(map(str, shape)) + (f" ({axes})" if axes else "")
         which = ",".join("0" for _ in long)
-        hint = f"name one volume of it as grid, such as [{which}]" if long else "leave the numbers in [] out"
+        hint = (
+            f"name one volume of it by {GRID}, such as [{which}]" if long else "leave the numbers in [] out"
+        )
         raise VolumeError(
             f"is an array of {said} samples, which takes {len(long)} numbers in []", where, hint
         )

@@ -74,7 +74,7 @@ class SparseParts:
         if leaves * leaf_bytes + 2 * tiles * tile_bytes > self.max_bytes:
             self.fail(
                 f"{leaves} leaves and {tiles} tiles need more than the limit of {self.max_bytes} bytes",
-                "use a smaller grid, or raise max_bytes",
+                "use a smaller grid",
             )
 
     def set_background(self, stored: float | Sequence[float] | np.ndarray) -> None:

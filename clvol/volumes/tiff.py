@@ -104,8 +104,8 @@ def _stack(tiff: Any, indices: tuple[int, ...], path: str | os.PathLike[str], si
         axes = axes.replace("Z", "")
         axes = f"{axes[: len(axes) - 2 - rgb]}Z{axes[len(axes) - 2 - rgb :]}"
     if array.ndim == 2 + rgb:
-        size = f"{array.shape[1]} x {array.shape[0]} pixels"
-        raise VolumeError(f"is one picture, of {size}, and a volume is a stack of them", where, _PICTURE)
+        pixels = f"{array.shape[1]} x {array.shape[0]} pixels"
+        raise VolumeError(f"is one picture, of {pixels}, and a volume is a stack of them", where, _PICTURE)
     array = array[part_of(array.shape, indices, rgb, where, ", ".join(axes.lower()))]
     values = samples(array.shape, array.dtype, array.__getitem__, where)
     spacing, unit = _spacing(tiff)

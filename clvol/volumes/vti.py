@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clvol.base.extras import need
-from clvol.errors import VolumeError
+from clvol.errors import GRID, VolumeError
 from clvol.volumes.files import TRUNCATED, open_binary
 from clvol.volumes.placed import Axis, check_size, placed_grid, samples
 
@@ -78,7 +78,7 @@ def _grid(image: Any, to_numpy: Any, grid: str | None, path: str | os.PathLike[s
         active = [(d, d.GetScalars().GetName()) for d in sets if d.GetScalars() is not None]
         found = names if len(names) == 1 else active[:1]
         if not found:
-            raise VolumeError(f"holds {len(names)} arrays", where, f"name one as grid: {listed}")
+            raise VolumeError(f"holds {len(names)} arrays", where, f"name one by {GRID}: {listed}")
     else:
         found = [(data, name) for data, name in names if name == grid][:1]
         if not found:

@@ -315,7 +315,7 @@ def test_info_says_what_a_render_would_do_and_compile(scene: str) -> None:
     for text in (
         "technique      analytic               closed forms: all media are homogeneous",
         "medium_sample         MEDIUM     SHADE",
-        "note: technique delta is not used: the scene's media need only the analytic rule",
+        "note: --technique delta is not used: the scene's media need only the analytic rule",
     ):
         assert text in outcome.stdout
 

@@ -93,7 +93,7 @@ def test_another_render_does_not_go_on_from_a_file(tmp_path: Path) -> None:
     path = tmp_path / "a.exr"
     rendered(scene(), spp=2, seed=SEED).save(path)
     for options, message in (
-        ({"seed": 8}, "another seed: 7, not 8; give seed 7, or render anew"),
+        ({"seed": 8}, "another seed: 7, not 8; give seed=7, or render anew"),
         ({"technique": "weighted-delta"}, "another technique: 'delta', not 'weighted-delta'"),
         ({"size": (9, 8)}, "8 x 8 pixels with one of 9 x 8"),
         ({"aov": ["depth"]}, "with lookups, with one with lookups, depth"),
@@ -117,7 +117,7 @@ def test_pictures_that_cannot_merge_say_so_before_the_render(tmp_path: Path) -> 
         clvol.merge([half, rendered(scene(), samples=(2, 2), seed=SEED)])
     target = saved(rendered(scene(), target_error=0.5, seed=SEED), tmp_path)
     assert (target.estimate.counts.reshape(8, 8) == target.aovs["samples"]).all()
-    with pytest.raises(clvol.OptionError, match="results of a target_error do not merge"):
+    with pytest.raises(clvol.OptionError, match="results of a target error do not merge"):
         rendered(scene(), spp=4, seed=SEED, resume=target)
 
 

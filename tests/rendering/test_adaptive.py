@@ -444,7 +444,7 @@ def test_a_target_and_a_range_of_samples_exclude_each_other():
 
 def test_pictures_of_a_target_do_not_merge():
     one, other = (clvol.render(inside(), target_error=0.3, seed=1) for _ in range(2))
-    with pytest.raises(OptionError, match="target_error do not merge"):
+    with pytest.raises(OptionError, match="target error do not merge"):
         clvol.merge([one, other])
     with pytest.raises(OptionError, match="different target_error"):
         clvol.merge([one, clvol.render(inside(), spp=4, seed=1)])

@@ -11,7 +11,7 @@ import numpy as np
 from clvol.base.arguments import check_seed, positive, whole
 from clvol.base.interrupts import interruptible
 from clvol.device.device import Device, open_device
-from clvol.errors import OptionError
+from clvol.errors import OptionError, either, option
 from clvol.lab.comparison.bar import Bar
 from clvol.lab.comparison.combine import open_lineup
 from clvol.lab.comparison.figures import compute_figures
@@ -132,7 +132,8 @@ def compare(
 def _nothing_to_compare(reasons: list[str]) -> OptionError:
     """With a reference that is given even one combination is compared with something."""
     what = "; ".join(["only one combination: nothing to compare", *reasons])
-    return OptionError(what, hint="name several, as --techniques delta,regular, or give a --reference")
+    names = either("techniques=['delta', 'regular']", "--techniques delta,regular")
+    return OptionError(what, hint=f"name several, as {names}, or give a {option('reference')}")
 
 
 def _silent(done: float, expected: float, text: str) -> None:
@@ -149,7 +150,9 @@ def _effort(
 ) -> Effort:
     """How much to render; OptionError for numbers that won't do."""
     if time_limit is not None and spp is not None:
-        raise OptionError("time_limit and spp exclude each other", hint="give one of them")
+        raise OptionError(
+            f"{option('time_limit')} and {option('spp')} exclude each other", hint="give one of them"
+        )
     if time_limit is not None:
         positive("time limit ", time_limit, " of seconds")
     seed = check_seed(scene.seed if seed is None else seed)
@@ -160,9 +163,9 @@ def _effort(
         if value is None:
             continue
         if whole(name, value) < least[name]:
-            raise OptionError(f"{name}={value} is too few", hint=f"give at least {least[name]}")
+            raise OptionError(f"{option(name, value)} is too few", hint=f"give at least {least[name]}")
         if value > most[name]:
-            raise OptionError(f"{name}={value} is too many", hint=f"give at most {most[name]}")
+            raise OptionError(f"{option(name, value)} is too many", hint=f"give at most {most[name]}")
     return Effort(rounds, time_limit or DEFAULT_SECONDS, spp, reference_spp, seed)
 
 

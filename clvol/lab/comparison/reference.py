@@ -12,7 +12,7 @@ import numpy as np
 
 from clvol.base.files import other_kind
 from clvol.base.image_reading import UnreadableError, read_stored
-from clvol.errors import OptionError, shown
+from clvol.errors import OptionError, either, shown
 from clvol.scene.digest import scene_digest
 
 if TYPE_CHECKING:
@@ -93,10 +93,11 @@ def read_reference(path: str | os.PathLike[str], scene: Scene) -> Reference:
     image = np.stack([planes[name] for name in "RGB"], axis=-1).astype(np.float64)
     size = tuple(scene.film.window[2:])
     if image.shape[1::-1] != size:
+        given = either("defaults", "-D")
         raise OptionError(
             f"is {image.shape[1]} x {image.shape[0]} pixels, the scene's film {size[0]} x {size[1]}",
             where=where,
-            hint="render it with the same -D, or give -D to match it",
+            hint=f"render it with the same {given}, or give those that match it",
         )
     known = all(f"variance.{name}" in planes for name in "RGB")
     variance = np.zeros_like(image)
@@ -158,7 +159,7 @@ def _warn_of_doubts(where: str, metadata: dict[str, object], known: bool, scene:
             "%s has no variance channels: its own error cannot be subtracted, and counts as everyone's", where
         )
     if "digest" in metadata and metadata["digest"] != scene_digest(scene):
-        log.warning("%s was made of another scene, or with other -D", where)
+        log.warning("%s was made of another scene, or with other values of its defaults", where)
     if metadata.get("biased"):
         log.warning("%s is biased itself (%s)", where, metadata["biased"])
 
