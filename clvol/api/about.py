@@ -120,7 +120,8 @@ def scene_lines(scene: Scene, choices: dict[str, Any]) -> list[str]:
         lines = [f"note: cannot be rendered as it is: {refused}"]  # by its own choices
     else:
         asked = {family: choices.get(family, "auto") for family in FAMILIES}
-        lines = [*planned.describe(), *(Told(f"note: {warning.marked}") for warning in warnings(planned, asked))]
+        notes = (Told(f"note: {warning.marked}") for warning in warnings(planned, asked))
+        lines = [*planned.describe(), *notes]
     return [*describe_scene(scene), "", *lines]
 
 
