@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import logging
-import math
-import operator
 import time
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from clvol.api.extent import check_alone, sample_range
 from clvol.api.resuming import check_same, resumable, what_is_left
-from clvol.base.arguments import check_seed, flag, positive
+from clvol.base.arguments import check_seed, flag
 from clvol.base.progress import Glance, Progress
 from clvol.device.device import open_device
-from clvol.errors import OptionError, either, option, shown
+from clvol.errors import OptionError
 from clvol.picture.denoising import FEATURES, need_denoiser
 from clvol.picture.merging import merge
 from clvol.planning import registry
@@ -79,11 +78,10 @@ class Order:
         OptionError, SceneError
             Something that won't do, as far as can be told without a device.
         """
+        check_alone(given)
         view = given["sensor"], given["size"]
         scene = viewed(check_scene(function, scene), *view, given["background"])
         asked = {family: given[family] for family in registry.FAMILIES}
-        for family, name in asked.items():
-            registry.check_choice(family, name, pilot=True)
         transparent = asked["background"] == registry.TRANSPARENT
         if transparent:
             asked["background"] = "auto"
@@ -94,17 +92,12 @@ class Order:
         choices = Choices.for_scene(scene, asked, **numbers)
         if piloted:
             choices = choices.but(technique="auto")  # the scene's own technique too is put to the test
-        if choices.target_error is not None and given["samples"] is not None:
-            raise OptionError(
-                f"{option('target_error')} and {option('samples')} exclude each other",
-                hint=f"{option('spp')} says how many at most",
-            )
         denoise = _denoises(given["denoise"])
         spp, time_limit = given["spp"], given["time_limit"]
-        first, count = _sample_range(scene, spp, time_limit, given["samples"])
+        first, count = sample_range(scene.spp, spp, time_limit, given["samples"])
         resumed = None
         if given["resume"] is not None:
-            resumed = resumable(given["resume"], piloted, choices.target_error, given["samples"])
+            resumed = resumable(given["resume"])
             first, count = what_is_left(resumed, count)
         seed = check_seed(scene.seed if given["seed"] is None else given["seed"])
         extent = first, count, spp, seed, time_limit
@@ -242,35 +235,3 @@ def check_scene(function: str, scene: object) -> Scene:
             hint="make one with load_file or load_dict",
         )
     return scene
-
-
-def _sample_range(
-    scene: Scene, spp: int | None, time_limit: float | None, samples: tuple[int, int] | None
-) -> tuple[int, int]:
-    """First sample and how many; a time limit alone sets no end."""
-    if samples is not None and spp is not None:
-        hint = f"{either('samples=(first, count)', '--samples FIRST,COUNT')} says both"
-        raise OptionError(f"{option('spp')} and {option('samples')} exclude each other", hint=hint)
-    if time_limit is not None and not (isinstance(time_limit, float) and time_limit == math.inf):
-        positive("time limit ", time_limit, " of seconds")
-    if samples is not None:
-        if not isinstance(samples, tuple | list) or len(samples) != 2:
-            raise OptionError(
-                f"{option('samples')} {shown(samples)} is not a pair", hint="give (first, count)"
-            )
-        first, count = samples
-    elif time_limit is not None and spp is None:
-        first, count = 0, MAX_SAMPLES
-    else:
-        first, count = 0, scene.spp if spp is None else spp
-    try:
-        first, count = operator.index(first), operator.index(count)
-    except TypeError:
-        given = f"not {shown(first)} and {shown(count)}"
-        raise OptionError("numbers of samples must be whole", hint=given) from None
-    if first < 0 or count < 1 or first + count > MAX_SAMPLES:
-        raise OptionError(
-            f"cannot render {count} samples per pixel from sample {first} on",
-            hint=f"give at least 1 sample, and at most {MAX_SAMPLES} in all",
-        )
-    return first, count

@@ -23,24 +23,8 @@ _FIRST = ("seed", "digest", "technique", "transmittance")
 """Differences that others follow from."""
 
 
-def resumable(
-    given: Result | str | PathLike[str], piloted: bool, target_error: float | None, samples: object
-) -> Result:
-    """The picture to go on from; OptionError where none can go on from it, or other options say otherwise."""
-    if piloted:
-        raise OptionError(
-            f"{option('resume')} goes on with the choices of a picture", hint="leave auto:pilot out"
-        )
-    if target_error is not None:
-        raise OptionError(
-            "a picture to a target error cannot go on from another",
-            hint=f"give {option('spp')} or {option('time_limit')} instead",
-        )
-    if samples is not None:
-        raise OptionError(
-            f"{option('resume')} and {option('samples')} exclude each other",
-            hint=f"{option('spp')} says how many there are to be",
-        )
+def resumable(given: Result | str | PathLike[str]) -> Result:
+    """The picture to go on from; OptionError where none can go on from it."""
     result = given if isinstance(given, Result) else load_result(given)
     if isinstance(result.estimate, Uneven):
         reason, hint = result.estimate.reason, result.estimate.hint

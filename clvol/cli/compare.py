@@ -99,12 +99,17 @@ def compare(
     """
     from clvol.base.progress import error_console
     from clvol.lab.comparison.bar import Bar
+    from clvol.lab.comparison.comparing import check_asked
     from clvol.lab.comparison.report import check_folder, write_or_keep
+    from clvol.planning.registry import FAMILIES
 
     if options["spp"] is not None and options["time_limit"] is not None:
         raise click.UsageError("give --spp or --time, not both")
     if options["reference"] is not None and options["reference_spp"] is not None:
         raise click.UsageError("give --reference or --reference-spp, not both")
+    numbers = {name: options[name] for name in ("time_limit", "spp", "rounds", "reference_spp")}
+    families = {family: options[family] for family in FAMILIES}
+    check_asked(options["seed"] or 0, options["reference"], families, **numbers)
     check_folder(output)
     console = error_console()
     with logging_to(console, verbose=False):

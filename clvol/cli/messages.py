@@ -28,6 +28,15 @@ LONGEST_LINE = 3000
 class OneLineErrors(click.Group):
     """A command group whose users' mistakes end in one line on standard error and status 2, no traceback."""
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """As `click.Group` does, and refuse options that are given twice and take one value."""
+        name, command, rest = super().resolve_command(ctx, args)
+        if command is not None:
+            check_once(command, click.Context(command, info_name=name, parent=ctx), rest)
+        return name, command, rest
+
     def main(
         self,
         args: Sequence[str] | None = None,
@@ -60,6 +69,18 @@ class OneLineErrors(click.Group):
                 mention(["clvol: interrupted"], err=True)
                 sys.exit(interrupt.status)
             sys.exit(status if isinstance(status, int) else 0)
+
+
+def check_once(command: click.Command, ctx: click.Context, arguments: Sequence[str]) -> None:
+    """click.UsageError for an option that is given twice, of which one would be left out without a word."""
+    _, _, order = command.make_parser(ctx).parse_args(args=list(arguments))
+    seen: set[str] = set()
+    for one in order:
+        if not isinstance(one, click.Option) or one.multiple or one.is_flag or one.count:
+            continue
+        if one.name in seen:
+            raise click.UsageError(f"{max(one.opts, key=len)} is given twice", ctx)
+        seen.add(str(one.name))
 
 
 def fail(message: str, whole: bool = False) -> NoReturn:

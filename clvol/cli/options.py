@@ -154,9 +154,22 @@ def positive_option(*names: str, **settings: Any) -> Callable[[F], F]:
     return click.option(*names, type=above_zero, callback=finite, **settings)
 
 
+def named_once(
+    ctx: click.Context, param: click.Parameter, value: tuple[tuple[str, str], ...]
+) -> tuple[tuple[str, str], ...]:
+    """Callback of an option that gives names values: refuse one that is given two."""
+    seen: set[str] = set()
+    for name, _ in value:
+        if name in seen:
+            raise click.BadParameter(f"{name} is given twice", ctx=ctx, param=param)
+        seen.add(name)
+    return value
+
+
 definitions_option = click.option(
     "-D",
     "definitions",
+    callback=named_once,
     type=Definition(),
     multiple=True,
     metavar="NAME=VALUE",
@@ -165,6 +178,7 @@ definitions_option = click.option(
 assignments_option = click.option(
     "--set",
     "assignments",
+    callback=named_once,
     type=Assignment(),
     multiple=True,
     metavar="NAME=VALUE",

@@ -167,6 +167,7 @@ def render(
     well, and lit; what was chosen is printed. Ctrl-C ends the render early and keeps the picture so far, and
     so do SIGTERM and SIGHUP.
     """
+    from clvol.api.extent import check_alone
     from clvol.base.progress import error_console
 
     shown = Shown.taken(options)
@@ -179,6 +180,7 @@ def render(
     first = outputs if frames is None else frames.first_outputs
     read = {scene: "the scene"} | ({asked.given["light"]: "the light"} if asked.given.get("light") else {})
     _check_files(read, first, trace, shown, bool(options["aov"]))
+    check_alone(options | extent | {"resume": options["resume"] or None}, scene_chooses=not asked.is_volume)
     console, profiled = error_console(), options.pop("profile")
     options |= extent | {"profile": profiled or trace is not None}
     options["resume"] = _picture_to_go_on_from(outputs, frames is not None) if options["resume"] else None

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from clvol.cli.options import RegistryChoice
+from clvol.errors import OptionError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,7 +57,11 @@ class Background(RegistryChoice):
 
         if value == "auto" or value in self.entries():
             return value
-        return background("--background", value)
+        try:
+            return background("--background", value)
+        except OptionError as error:
+            hint = f"{error.hint}; how light is weighed is {', '.join(['auto', *self.entries()])}"
+            raise OptionError(error.what, hint=hint) from None
 
 
 def volume_options(command: F) -> F:

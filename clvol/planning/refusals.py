@@ -25,10 +25,7 @@ def refuse_impossible(features: Features, choices: Choices, chosen: Mapping[str,
         )
     marches = features.heterogeneous and (tracker.biased or estimator.biased)
     if choices.step is not None and not marches:
-        raise OptionError(
-            "step is for ray marching, and nothing marches here",
-            hint=f"choose {option('technique', 'marching')} or {option('transmittance', 'marching')}",
-        )
+        raise nothing_marches()
     if not features.heterogeneous:
         return  # closed forms take the place of every technique and transmittance
     used = [("technique", technique, tracker, "weighted-delta")]
@@ -57,6 +54,12 @@ def refuse_impossible(features: Features, choices: Choices, chosen: Mapping[str,
                 f"stochastic look-ups would bias {family} {name!r}, which is not linear in the density",
                 hint=f"use {option('lookup', 'exact')}",
             )
+
+
+def nothing_marches() -> OptionError:
+    """The error about a step that nothing takes."""
+    hint = f"choose {option('technique', 'marching')} or {option('transmittance', 'marching')}"
+    return OptionError(f"{option('step')} is for ray marching, and nothing marches here", hint=hint)
 
 
 MOST_STEPS = 1e5

@@ -29,8 +29,6 @@ UPS = ("y", "z")
 Value = Callable[[str, Any], Any]
 """Takes an option's name and what was given, as text too; OptionError if it won't do."""
 
-COLOURS = {"black": 0.0, "grey": 0.18, "gray": 0.18, "white": 1.0}
-"""Colours by name, as linear radiance."""
 TRANSPARENT = "transparent"
 
 
@@ -88,19 +86,18 @@ def spectrum(high: float = math.inf) -> Value:
 
 def colour(name: str, value: Any) -> tuple[float, ...]:
     """A colour as linear radiance, from a name, #rrggbb (sRGB), a number or three."""
-    if isinstance(value, str) and value.lower() in COLOURS:
-        return (COLOURS[value.lower()],)
-    if isinstance(value, str) and re.fullmatch(r"#[0-9a-fA-F]{6}", value):
-        import numpy as np
+    from clvol.staging.colours import NAMES, radiance_of
 
-        from clvol.scene.spectra import srgb_to_linear
-
-        encoded = np.array([int(value[n : n + 2], 16) for n in (1, 3, 5)], np.float32) / 255
-        return tuple(srgb_to_linear(encoded).tolist())
+    if isinstance(value, str) and (known := radiance_of(value)) is not None:
+        return known
     found = _numbers(value)
     if len(found) not in (1, 3) or min(found) < 0:
-        known = ", ".join(COLOURS)
-        raise _wrong(name, f"a colour: {known}, #rrggbb, or numbers of linear radiance as 0.1,0.2,0.3", value)
+        close = difflib.get_close_matches(value.lower()[:64], NAMES, n=1) if isinstance(value, str) else []
+        hint = f"did you mean '{close[0]}'? " if close else ""
+        expected = "a colour: a name, #rrggbb, or numbers of linear radiance as 0.1,0.2,0.3"
+        raise OptionError(
+            f"{name} must be {expected}, not {shown(value)}", hint=f"{hint}names are {', '.join(NAMES)}"
+        )
     return tuple(found)
 
 

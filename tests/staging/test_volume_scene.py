@@ -19,6 +19,8 @@ import clvol
 from clvol.cli.main import main
 from clvol.errors import OptionError, VolumeError
 from clvol.scene.records import ConstVolume, EnvmapEmitter, GridVolume
+from clvol.scene.spectra import srgb_to_linear
+from clvol.staging.colours import NAMES, radiance_of
 from clvol.staging.options import OPTIONS, checked
 from clvol.staging.source import Source
 from clvol.staging.stage import stage
@@ -246,6 +248,19 @@ def test_what_is_behind_has_any_colour_or_none() -> None:
     clear = clvol.volume_scene(ball(), background="transparent")
     assert clvol.volume_scene(ball(), background="black").film.backdrop == (0.0,)
     assert clear.film.has_alpha and clear.integrator.hide_emitters
+    for name in ("red", "RED", "#f00", "#FF0000"):
+        assert clvol.volume_scene(ball(), background=name).film.backdrop == (1.0, 0.0, 0.0)
+    with pytest.raises(OptionError, match=r"did you mean 'orange'.*names are black, grey"):
+        clvol.volume_scene(ball(), background="ornage")
+
+
+@pytest.mark.parametrize("name", [*NAMES, "gray", "aqua", "fuchsia"])
+def test_colours_are_those_of_css(name: str) -> None:
+    colors = pytest.importorskip("matplotlib.colors", reason="the extra 'science' is not installed")
+    other = {"grey": "gray"}.get(name, name)
+    np.testing.assert_allclose(
+        np.broadcast_to(radiance_of(name), 3), srgb_to_linear(np.float32(colors.to_rgb(other))), atol=1e-6
+    )
 
 
 @pytest.mark.parametrize(

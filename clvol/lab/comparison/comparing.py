@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 from contextlib import nullcontext
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from clvol.version import __version__
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from clvol.lab.comparison.entrants import Told
 
@@ -101,13 +101,9 @@ def compare(
         raise OptionError(
             f"compare takes a Scene, not {type(scene).__name__}", hint="make one with load_file or load_dict"
         )
-    asked = names_asked(families)
-    effort = _effort(scene, time_limit, spp, rounds, reference_spp, seed)
-    if reference is not None and reference_spp is not None:
-        raise OptionError("reference_spp is for a reference that is rendered, and one is given")
+    numbers = {"time_limit": time_limit, "spp": spp, "rounds": rounds, "reference_spp": reference_spp}
+    asked, effort = check_asked(scene.seed if seed is None else seed, reference, families, **numbers)
     given = None if reference is None else read_reference(reference, scene)
-    if given is None and all(len(names) == 1 for names in asked.values()):
-        raise _nothing_to_compare([])
     opened = open_device(device)
     bar = Bar() if progress is True else nullcontext(progress or _silent)
     with interruptible(), bar as told:
@@ -129,6 +125,20 @@ def compare(
     )
 
 
+def check_asked(
+    seed: int, reference: object, families: Mapping[str, str | Iterable[str]], **numbers: Any
+) -> tuple[dict[str, tuple[str, ...]], Effort]:
+    """Names by family, and how much to render; OptionError for what won't do, whatever the scene."""
+    asked = names_asked(families)
+    effort = _effort(seed=seed, **numbers)
+    if reference is not None and numbers["reference_spp"] is not None:
+        what = f"{option('reference_spp')} is for a reference that is rendered, and one is given"
+        raise OptionError(what)
+    if reference is None and all(len(names) == 1 for names in asked.values()):
+        raise _nothing_to_compare([])
+    return asked, effort
+
+
 def _nothing_to_compare(reasons: list[str]) -> OptionError:
     """With a reference that is given even one combination is compared with something."""
     what = "; ".join(["only one combination: nothing to compare", *reasons])
@@ -141,12 +151,12 @@ def _silent(done: float, expected: float, text: str) -> None:
 
 
 def _effort(
-    scene: Scene,
+    *,
     time_limit: float | None,
     spp: int | None,
     rounds: int,
     reference_spp: int | None,
-    seed: int | None,
+    seed: int,
 ) -> Effort:
     """How much to render; OptionError for numbers that won't do."""
     if time_limit is not None and spp is not None:
@@ -155,7 +165,7 @@ def _effort(
         )
     if time_limit is not None:
         positive("time limit ", time_limit, " of seconds")
-    seed = check_seed(scene.seed if seed is None else seed)
+    seed = check_seed(seed)
     least = {"rounds": LEAST_ROUNDS, "spp": 1, "reference_spp": 1}
     most = {"rounds": MOST_ROUNDS, "spp": MAX_SAMPLES // REFERENCE_SAMPLES, "reference_spp": MAX_SAMPLES}
     given = {"rounds": rounds, "spp": spp, "reference_spp": reference_spp}
