@@ -1,4 +1,4 @@
-"""Meshes from files: STL and glTF through trimesh, the rest by `obj` and `ply`."""
+"""Meshes from files: STL and glTF through trimesh, the rest by `obj`, `ply` and `serialized`."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from clvol.scene.gltf import plain_gltf
 from clvol.scene.mesh import RawMesh, build_mesh
 from clvol.scene.obj import read_obj
 from clvol.scene.ply import read_ply
+from clvol.scene.serialized import read_serialized
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("clvol")
 
-FORMATS = ("obj", "ply", "stl", "glb", "gltf")
+FORMATS = ("obj", "ply", "serialized", "stl", "glb", "gltf")
 _HINTS = {  # what trimesh says, and what it may mean
     "No module named": "it is damaged, or needs that package",
     "No such file": "a gltf needs the files that it names beside it: try glb",
@@ -32,12 +33,13 @@ _HINTS = {  # what trimesh says, and what it may mean
 
 
 def read_mesh(
-    path: Path, kind: str, flip_tex_coords: bool = False, face_normals: bool = False
+    path: Path, kind: str, flip_tex_coords: bool = False, face_normals: bool = False, shape_index: int = 0
 ) -> tuple[Mesh, np.ndarray]:
     """The triangles of a file of one of `FORMATS`, and the point (float64 (3,)) they are relative to.
 
     Parts of a glTF scene are put together under their transforms.  An STL always has face normals: it does
-    not say which triangles meet.  `flip_tex_coords`: v becomes 1 − v.
+    not say which triangles meet.  `flip_tex_coords`: v becomes 1 − v.  `shape_index`: which of the meshes
+    of a serialized file, from 0.
 
     Raises
     ------
@@ -45,7 +47,7 @@ def read_mesh(
         Not a mesh of this format, or one that cannot be rendered; what is wrong and perhaps what to do.
     """
     try:
-        raw = _read(path, kind)
+        raw = _read(path, kind, shape_index)
     except Exception as error:  # trimesh raises whatever its parsers stumble over
         reason = " ".join(str(error).split())[:160] or type(error).__name__
         hint = next((f" ({meaning})" for said, meaning in _HINTS.items() if said in reason), "")
@@ -61,11 +63,13 @@ def read_mesh(
     return build_mesh(raw, str(path), smooth=not face_normals and kind != "stl")
 
 
-def _read(path: Path, kind: str) -> RawMesh:
+def _read(path: Path, kind: str, shape_index: int) -> RawMesh:
     if kind == "obj":
         return read_obj(path.read_bytes())
     if kind == "ply":
         return read_ply(path.read_bytes())
+    if kind == "serialized":
+        return read_serialized(path, shape_index)
     return _read_with_trimesh(path, kind)
 
 

@@ -81,17 +81,19 @@ def stays_round(matrix: np.ndarray) -> bool:
 
 
 def mesh(reader: Reader) -> Shape:
-    """The `obj`, `ply`, `stl`, `glb` and `gltf` plugins: the triangles of a file.
+    """The `obj`, `ply`, `serialized`, `stl`, `glb` and `gltf` plugins: the triangles of a file.
 
     An stl has neither normals nor texture coordinates of its vertices.
     """
     if not reader.has("filename"):
         reader.fail(f"shape '{reader.type}' needs a filename")
     path = find_parameter(reader, "filename")
-    flip = reader.type != "stl" and reader.boolean("flip_tex_coords", reader.type != "ply")
+    flippable = reader.type not in ("stl", "serialized")
+    flip = flippable and reader.boolean("flip_tex_coords", reader.type != "ply")
+    shape_index = reader.integer("shape_index", 0, 0) if reader.type == "serialized" else 0
     face_normals = reader.boolean("face_normals", False)
     try:
-        read, origin = read_mesh(path, reader.type, flip, face_normals)
+        read, origin = read_mesh(path, reader.type, flip, face_normals, shape_index)
     except ValueError as error:
         name = f" of shape '{reader.node.id}'" if reader.node.id else ""
         reader.fail(f"mesh '{path}'{name}: {error}", "filename")

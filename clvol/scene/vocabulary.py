@@ -20,7 +20,7 @@ LATER: dict[str, tuple[str, ...]] = {
     "film": ("specfilm",),
     "sampler": ("stratified", "multijitter", "orthogonal", "ldsampler"),
     "shape": (
-        *("serialized", "mesh", "instance", "shapegroup", "bsplinecurve", "linearcurve", "sdfgrid"),
+        *("mesh", "instance", "shapegroup", "bsplinecurve", "linearcurve", "sdfgrid"),
         *("ellipsoids", "heightfield", "merge"),
     ),
     "bsdf": ("principled", "bumpmap", "normalmap", "blendbsdf"),

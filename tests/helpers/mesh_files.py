@@ -2,6 +2,7 @@
 
 import json
 import struct
+import zlib
 
 import numpy as np
 
@@ -64,3 +65,26 @@ def glb(primitives, nodes, **extra):
     text += b" " * (-len(text) % 4)
     body = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(blob), b"BIN\0") + blob
     return b"glTF" + struct.pack("<II", 2, 12 + len(body)) + body
+
+
+def serialized_mesh(vertices, faces, normals=None, uvs=None, colors=None, **how):
+    """One mesh as it is in a Mitsuba `.serialized`: its header, then the rest deflated.
+
+    how : version = 4, double = False, flags = 0 (more of them), name = "mesh", counts (what it claims).
+    """
+    version, double = how.get("version", 4), how.get("double", False)
+    given = [part for part in (vertices, normals, uvs, colors) if part is not None]
+    flags = how.get("flags", 0) | (0x2000 if double else 0x1000)
+    flags |= (normals is not None) | 2 * (uvs is not None) | 8 * (colors is not None)
+    name = how.get("name", "mesh").encode() + b"\0" if version == 4 else b""
+    body = struct.pack("<I", flags) + name
+    body += struct.pack("<QQ", *how.get("counts", (len(vertices), len(faces))))
+    body += b"".join(np.asarray(part, "<f8" if double else "<f4").tobytes() for part in given)
+    body += np.asarray(faces, "<u4").tobytes()
+    return struct.pack("<HH", 0x041C, version) + zlib.compress(body)
+
+
+def serialized(*meshes, version=4):
+    """A `.serialized` file of several meshes."""
+    offsets = np.cumsum([0, *map(len, meshes)])[:-1].astype("<u8" if version == 4 else "<u4")
+    return b"".join(meshes) + offsets.tobytes() + struct.pack("<I", len(meshes))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio  # noqa: N813
-from mesh_files import ascii_ply
+from mesh_files import ascii_ply, serialized, serialized_mesh
 
 from clvol.volumes import write_vol
 
@@ -30,6 +30,7 @@ def write_files(folder):
     write_vol(folder / "colours.vol", rng.uniform(0, 1, (3, 4, 5, 3)).astype(np.float32), unit)
     (folder / "smooth.ply").write_bytes(_smooth_ply())
     (folder / "cup.obj").write_text(_cup_obj())
+    (folder / "pair.serialized").write_bytes(_pair())
     for scene in SCENES:
         shutil.copy(scene, folder)
 
@@ -40,6 +41,15 @@ def _write_image(path, pixels):
     out.open(str(path), oiio.ImageSpec(width, height, channels, str(pixels.dtype)))
     out.write_image(pixels)
     out.close()
+
+
+def _pair():
+    """A tetrahedron, and one with texture coordinates and normals that are not its faces'."""
+    corners = np.array([(1, 1, 1), (-1, -1, 1), (-1, 1, -1), (1, -1, -1)], float)
+    faces = [(0, 1, 3), (0, 2, 1), (0, 3, 2), (1, 2, 3)]
+    normals, uvs = corners + np.array([0.2, 0.5, 0.1]), (corners[:, :2] + 1.1) / 2
+    rich = serialized_mesh(corners, faces, normals, uvs, corners, double=True)
+    return serialized(serialized_mesh(corners, faces), rich)
 
 
 def _smooth_ply(rings=6, sectors=9):

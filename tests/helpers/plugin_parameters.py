@@ -148,6 +148,7 @@ PARAMETERS = {
         {"filename": "a.ply"},
         MESH | {"filename": "b.ply", "flip_tex_coords": Silent(True)},
     ),  # without uvs
+    "serialized": ({"filename": "a.serialized"}, MESH | {"filename": "b.serialized", "shape_index": 1}),
     "stl": ({"filename": "a.stl"}, MESH | {"filename": "b.stl", "face_normals": Silent(True)}),
     "glb": ({"filename": "a.glb"}, MESH | {"filename": "b.glb", "flip_tex_coords": Silent(False)}),
     "gltf": ({"filename": "a.gltf"}, MESH | {"filename": "b.gltf", "flip_tex_coords": Silent(False)}),

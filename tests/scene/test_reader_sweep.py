@@ -11,6 +11,7 @@ import numpy as np
 import OpenImageIO as oiio  # noqa: N813
 import pytest
 import trimesh
+from mesh_files import serialized, serialized_mesh
 from plugin_parameters import CELLS, INSTEAD, PARAMETERS, RGB, SKY, Silent
 from vdb_writer import GridSpec, write_vdb
 
@@ -47,6 +48,8 @@ def files(tmp_path_factory):
             lines += ["vn 0.6 0 0.8", *(f"f {a}/1/1 {b}/2/1 {c}/3/1" for a, b, c in ((1, 3, 2), (1, 2, 4)))]
             (folder / f"{name}.obj").write_text("\n".join(lines))
             ball.export(folder / f"{name}.ply", vertex_normal=True)
+            one, two = (serialized_mesh(scale * ball.vertices, ball.faces) for scale in (1, 3))
+            (folder / f"{name}.serialized").write_bytes(serialized(one, two))
             ball.export(folder / f"{name}.stl")
             ball.export(folder / f"{name}.glb", include_normals=True)
             for part, data in trimesh.exchange.gltf.export_gltf(

@@ -36,6 +36,7 @@ PICTURES = {
     "room": ("room", {}, 96, 2048),
     "glass": ("glass", {}, 32, 1024),
     "meshes": ("meshes", {}, 32, 4096),
+    "shapes": ("shapes", {}, 64, 4096),
     "lamps": ("lamps", {}, 64, 2048),
     "fog": ("fog", {}, 96, 4096),
     "cloud": ("cloud", {}, 24, 1024),
