@@ -39,7 +39,10 @@ PLUGINS: PluginTable = {
         "catmullrom": sensor.catmullrom,
         "lanczos": sensor.lanczos,
     },
-    "sampler": {"independent": sensor.independent},
+    "sampler": {
+        "independent": sensor.independent,
+        **dict.fromkeys(sensor.OTHER_SAMPLERS, sensor.other_sampler),
+    },
     "shape": {
         "cube": shape.cube,
         "sphere": shape.sphere,
@@ -242,6 +245,7 @@ def _build(root: Node, source: str, grids: Grids | None = None) -> Scene:
         seed=sensors[0].sampler.seed,
         source=source,
         sensors=sensors,
+        approximated=tuple(library.approximated),
     )
 
 

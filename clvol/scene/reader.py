@@ -269,6 +269,17 @@ class Reader:
 
     # -- the rest ----------------------------------------------------------------------------------
 
+    def approximated(self, as_what: str, name: str = "") -> None:
+        """Say that this plugin, or its parameter `name`, is taken as something else.
+
+        Once for all alike in the log, with the first one's place, and in the metadata of pictures.
+        """
+        taken = f"'{name}' of {self.kind} '{self.type}'" if name else f"{self.kind} '{self.type}'"
+        said = f"{taken} is taken as {as_what}"
+        if said not in self.library.approximated:
+            self.library.approximated.append(said)
+            log.warning("%s: %s", self.node.place(name) if name else self.node.where, said)
+
     def ignore(self, **names: type) -> None:
         """Accept parameters of these types (bool, int, float, str): they do not change the expected image."""
         for name, kind in names.items():

@@ -349,6 +349,7 @@ class Scene:
     source: str = ""  # file the scene came from, for messages and metadata
     files: tuple[str, ...] = field(default=(), repr=False)  # all it was read from: nothing replaces them
     sensors: tuple[Sensor, ...] = ()
+    approximated: tuple[str, ...] = field(default=(), repr=False)  # what is taken as what
     kept: Kept = field(default_factory=Kept, repr=False)
 
     def __post_init__(self) -> None:

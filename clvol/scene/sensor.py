@@ -195,3 +195,22 @@ def lanczos(reader: Reader) -> ReconstructionFilter:
 def independent(reader: Reader) -> Sampler:
     """The `independent` sampler."""
     return Sampler(reader.integer("sample_count", 4, 1), reader.integer("seed", 0, 0, 2**32 - 1))
+
+
+OTHER_SAMPLERS: dict[str, dict[str, type]] = {
+    "stratified": {"jitter": bool},
+    "multijitter": {"jitter": bool},
+    "orthogonal": {"strength": int, "jitter": bool},
+    "ldsampler": {"dimension": int},
+    "halton": {"scramble": int},
+    "hammersley": {"scramble": int},
+    "sobol": {"scramble": int},
+}
+"""Mitsuba's other samplers, the last three from before its version 2; and their own parameters, by type."""
+
+
+def other_sampler(reader: Reader) -> Sampler:
+    """One of `OTHER_SAMPLERS`: its sample count and seed; how samples are drawn is a choice of the render."""
+    reader.ignore(**OTHER_SAMPLERS[reader.type])
+    reader.approximated("clvol's own sampler, of the same sample count")
+    return independent(reader)

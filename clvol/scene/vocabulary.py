@@ -18,7 +18,6 @@ LATER: dict[str, tuple[str, ...]] = {
     "integrator": ("direct", "aov", "depth", "ptracer"),
     "sensor": ("orthographic", "radiancemeter", "irradiancemeter", "distant", "batch"),
     "film": ("specfilm",),
-    "sampler": ("stratified", "multijitter", "orthogonal", "ldsampler"),
     "shape": (
         *("mesh", "instance", "shapegroup", "bsplinecurve", "linearcurve", "sdfgrid"),
         *("ellipsoids", "heightfield", "merge"),

@@ -213,10 +213,7 @@ def test_a_crop_is_a_window_of_the_film():
             "unknown parameter 'radius'",
         ),
         ({"sampler": {"type": "independent", "sample_count": 0}}, "from 1"),
-        (
-            {"sampler": {"type": "multijitter"}},
-            "scene.camera.sampler: sampler 'multijitter' is not supported",
-        ),
+        ({"sampler": {"type": "multijitters"}}, "scene.camera.sampler: unknown plugin 'multijitters'; did"),
         ({"a": {"type": "hdrfilm"}, "b": {"type": "hdrfilm"}}, "takes one film"),
         ({"bsdf": {"type": "null"}}, "takes no bsdf"),
     ],
