@@ -107,6 +107,11 @@ class SideBuilds:
             process.wait()
         for thread in self._threads:
             thread.join()
+        for process in self.processes:
+            for pipe in (process.stdin, process.stdout):
+                with suppress(OSError):  # of what was not read any more
+                    if pipe:
+                        pipe.close()
 
     def wait(self, source: str) -> None:
         """Return once a program is built or given up.  Until then this process builds what is left."""

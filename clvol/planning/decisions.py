@@ -196,6 +196,12 @@ class Decisions:
         )
 
     @property
+    def walks_by_collisions(self) -> bool:
+        """The technique, or what estimates transmittance, goes by tentative collisions with the majorant."""
+        walkers = [self.tracker, *([self.estimator] if self.nee else [])]
+        return any(one.walks_majorant and not one.interpolated for one in walkers)
+
+    @property
     def randomizations(self) -> int:
         """Parts that a pixel's samples are dealt to; 0 where every sample is independent."""
         return layout.RANDOMIZATIONS if registry.SAMPLERS[self.chosen["sampler"]].low_discrepancy else 0

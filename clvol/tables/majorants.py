@@ -14,6 +14,7 @@ from clvol.accel.kdtree import KdTree, pack_maximum, unpack_maximum
 from clvol.accel.sparse_bounds import SparseBounds, from_dense, sparse_bounds
 from clvol.accel.sparse_grid import tree_grid
 from clvol.accel.sparse_kdtree import build_tree, finest_lattice
+from clvol.accel.steps import MANY_STEPS, Worst, worst_cell
 from clvol.errors import SceneError, option
 from clvol.scene.medium_facts import is_homogeneous
 from clvol.volumes.bricks import BOUND_CELLS, BrickTree
@@ -75,11 +76,13 @@ class Majorants:
     kind : "none" where no medium needs one.
     costs : expected cost per ray of each kind that was weighed for "auto".
     tables : for each medium, by number; None of homogeneous ones.
+    worst : of media in which walks by tentative collisions may take many steps.
     """
 
     kind: str
     costs: tuple[tuple[str, float], ...]
     tables: tuple[PreparedMajorant | None, ...]
+    worst: tuple[Worst, ...] = ()
 
 
 class _Walked(NamedTuple):
@@ -129,7 +132,9 @@ def choose_majorants(matter: Matter, volumes: Sequence[PreparedVolume], needs: M
         best = [c._replace(bounds=_as_sparse(c.bounds)) for c in best]
     for one, candidate in zip(walked, best, strict=True):
         tables[one.number] = _tables(candidate, chosen, needs, _longest(one))
-    return Majorants(chosen, tuple(costs.items()) if needs.majorant == "auto" else (), tuple(tables))
+    weighed = tuple(costs.items()) if needs.majorant == "auto" else ()
+    dense = (_worst(one, bounds[_density(matter, one)]) for one in walked)
+    return Majorants(chosen, weighed, tuple(tables), tuple(filter(None, dense)))
 
 
 def _density(matter: Matter, one: _Walked) -> tuple[int, Transfer | None]:
@@ -155,6 +160,18 @@ def _check_range(one: _Walked, needs: MajorantNeeds) -> None:
             f"sigma_t times scale {scale:g}{factor} is too large for a float",
             one.volume.volume.source or one.medium.name,
         )
+
+
+def _worst(one: _Walked, bounds: AnyBounds) -> Worst | None:
+    """Where a medium's walks have the most steps; None of one that is not that thick, whatever its cells."""
+    transfer = one.medium.transfer("sigma_t")
+    peak = one.volume.peak(transfer)
+    if float(np.max(_longest(one) * peak)) < MANY_STEPS:
+        return None
+    rate = float(np.max(one.medium.scale))
+    steps = worst_cell(bounds, one.volume.voxel * bounds.cell_size, rate)
+    where = one.volume.volume.source or one.medium.name
+    return Worst(where, rate * float(np.max(peak)), steps, transfer is not None)
 
 
 def _bounds(volume: PreparedVolume, needs: MajorantNeeds, transfer: Transfer | None) -> AnyBounds:

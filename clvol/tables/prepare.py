@@ -90,6 +90,9 @@ def prepare(scene: Scene, plan: Plan | None = None) -> PreparedScene:
         kept = scene.kept[__name__] = _Kept.of(scene, plan.boundaries, kept)
     refuse_fine_step(plan.choices.step, kept.radius)
     majorants = kept.majorants(plan.needs)
+    if plan.walks_by_collisions:
+        for worst in majorants.worst:
+            worst.check()
     settled = Settled(
         majorants.kind,
         majorants.costs,

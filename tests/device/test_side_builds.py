@@ -48,18 +48,19 @@ def run_apart(tmp_path, function):
 
 
 def build_twice(device, cache):
-    """Processes that were started, kernels that they left, and processes for the same kernels again."""
+    """Processes that were started, kernels and open pipes that they left, and processes for them again."""
     with SideBuilds(device, UNITS) as builds:
         for unit in UNITS:
             builds.wait(unit.source)
         left = len(list(cache.rglob("*.so")))
         builds.remember()
+    pipes = [pipe for process in builds.processes for pipe in (process.stdin, process.stdout)]
     with SideBuilds(device, UNITS) as again:
-        return len(builds.processes), left, len(again.processes)
+        return len(builds.processes), left, sum(not pipe.closed for pipe in pipes), len(again.processes)
 
 
 def test_kernels_are_built_in_processes_once(pocl, tmp_path):
-    assert run_apart(tmp_path, build_twice) == ["1", "4", "0"]
+    assert run_apart(tmp_path, build_twice) == ["1", "4", "0", "0"]
 
 
 @pytest.mark.parametrize("given", ["0", "1"])

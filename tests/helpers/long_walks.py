@@ -63,12 +63,12 @@ def scene_of(kind):
 
 
 def endless(kind):
-    """One voxel of 1e9; a majorant of 1e30; a medium that scatters 20,000 times across and never absorbs."""
+    """One voxel of 1e7; a majorant of 1e30; a medium that scatters 20,000 times across and never absorbs."""
     values = np.ones((4, 4, 4), np.float32)
     scale, albedo = 1.0, 0.5
     if kind == "voxel":
         values[:] = 0.0
-        values[1, 1, 1] = 1e9
+        values[1, 1, 1] = 1e7
     if kind == "albedo":
         scale, albedo = 20000.0, 1.0
     return seen(4, cloud=cube((0, 0, 0), (1, 1, 1), values, scale, albedo))

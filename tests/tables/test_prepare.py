@@ -176,5 +176,5 @@ def test_a_wrapped_volume_must_share_the_box_of_sigma_t(name, mode):
 def test_bounds_beyond_a_float_are_refused_with_the_factor_that_did_it():
     with pytest.raises(SceneError, match="too large for a float"):
         prepared(GREY * 1e20, 1e20)
-    with pytest.raises(SceneError, match="majorant_scale 1e\\+30 is too large for a float"):
+    with pytest.raises(SceneError, match="majorant_scale=1e\\+30 is too large for a float"):
         prepared(GREY * 1e20, 1.0, scale=1e30)
