@@ -26,7 +26,11 @@ INLINE void record_weighted(const Scene *scene, uint slot, float3 p, float3 norm
 {
     const Spectrum beta = path_beta(scene, slot) * path_sample_weight(scene, slot);
     const float weight = spectrum_signed_mean(beta);
+#if CLVOL_HAS_PARALLEL_RAYS
+    const float depth = dot_of(p - load_vector(scene->render->camera_eye), load_vector(scene->render->camera_forward));
+#else
     const float depth = length(p - load_vector(scene->render->camera_eye));
+#endif
     set_path_depth(scene, slot, weight * depth);
     set_path_normal(scene, slot, weight * normal);
     set_path_albedo(scene, slot, to_rgb(beta * albedo, (int)path_channel(scene, slot)));

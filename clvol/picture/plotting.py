@@ -98,7 +98,7 @@ def _draw_box(place: Any, scenery: Scenery) -> None:
     """The twelve sides; those behind the volume are dashed."""
     shares = np.array(list(product((0.0, 1.0), repeat=3)))
     corners = scenery.corner + shares @ scenery.edges
-    farthest = int(np.linalg.norm(corners - scenery.eye, axis=1).argmax())
+    farthest = int(scenery.place(corners)[2].argmax())
     pixels = scenery.project(corners)
     for one, other in ((a, b) for a in range(8) for b in range(a) if (a ^ b) in (1, 2, 4)):
         style = LINE | (HIDDEN if farthest in (one, other) else {})

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from clvol.volumes.transfer import Transfers
 
 AXIS_ALIGNED = 1e-6
@@ -20,16 +22,15 @@ class Scenery:
 
     Parameters
     ----------
-    eye : float64 (3,), where the camera is.  rows : float64 (3, 3), that take an offset from it to (a, b, c),
-        which is seen at pixel (a / c, b / c), from the top left corner, where c is above 0.
+    place : takes points (n, 3) in the world to (3, n): x and y in pixels from the top left corner, and a
+        number that is above 0 where they are in front of the camera.
     right : float64 (3,), unit, to the right in the picture.
     corner, edges : a corner of the volume's box, float64 (3,), and the three sides from it, rows of (3, 3).
     unit : of lengths, as "mm"; "" where nobody says.
     transfers : what the medium makes of its values, if anything.
     """
 
-    eye: np.ndarray
-    rows: np.ndarray
+    place: Callable[[np.ndarray], np.ndarray]
     right: np.ndarray
     corner: np.ndarray
     edges: np.ndarray
@@ -38,10 +39,8 @@ class Scenery:
 
     def project(self, points: np.ndarray) -> np.ndarray:
         """Pixels (n, 2) of points (n, 3) in the world; NaN of those behind the camera."""
-        a, b, c = self.rows @ (points - self.eye).T
-        with np.errstate(divide="ignore", invalid="ignore"):
-            seen = np.stack([a / c, b / c], axis=1)
-        return np.where(c[:, None] > 0, seen, np.nan)
+        x, y, depth = self.place(points)
+        return np.where(depth[:, None] > 0, np.stack([x, y], axis=1), np.nan)
 
     @property
     def middle(self) -> np.ndarray:

@@ -75,6 +75,7 @@ class Features:
     filter_table: bool = False
     signed_filter: bool = False
     lens: bool = False
+    parallel_rays: bool = False
     depth_limited: bool = False
     hide_emitters: bool = False
     hide_environment: bool = False

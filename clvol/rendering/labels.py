@@ -24,12 +24,11 @@ def scenery_of(prepared: PreparedScene) -> Scenery | None:
     volume = medium.sigma_t
     assert isinstance(volume, GridVolume)
     rays = camera_rays(prepared.scene.sensor, prepared.scene.film, np.zeros(3), np.inf)
-    columns = np.stack([rays.base_dx, rays.base_dy, rays.base], axis=1)
     linear, offset = volume.index_to_world[:3, :3], volume.index_to_world[:3, 3]
+    right = rays.dx if rays.parallel else rays.base_dx
     return Scenery(
-        rays.eye,
-        np.linalg.inv(columns),
-        rays.base_dx / np.linalg.norm(rays.base_dx),
+        rays.place,
+        right / np.linalg.norm(right),
         linear @ volume.lower + offset,
         (linear * (volume.upper - volume.lower)).T,
         volume.grid.unit if isinstance(volume.grid, DenseGrid) else "",

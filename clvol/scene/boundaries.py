@@ -231,15 +231,24 @@ def _replaces(found: Boundaries, holders: dict[int, list[Boundary]], inner: int,
 
 def camera_may_be_inside(scene: records.Scene, found: Boundaries) -> bool:
     """Conservative: whether rays may start within a boundary's bounds."""
-    sensor = scene.sensor
+    low, high = _starts_of_rays(scene.sensor, scene.film)
+    for boundary in found.boundaries:
+        lower, upper = shape_bounds(scene.shapes[boundary.shape])
+        if (high >= lower).all() and (low <= upper).all():
+            return True
+    return False
+
+
+def _starts_of_rays(sensor: records.Camera, film: records.Film) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of a box round all places where camera rays start."""
+    width, height = film.width, film.height
+    if isinstance(sensor, records.Orthographic):
+        corners = sensor.at([0, width, 0, width], [0, 0, height, height], film)
+        aside = np.ptp(corners, axis=0)  # filters may reach beyond the film
+        return corners.min(axis=0) - aside, corners.max(axis=0) + aside
     eye = sensor.to_world[:3, 3]
-    width, height = scene.film.width, scene.film.height
     tangent = np.tan(np.radians(sensor.fov) / 2) * max(width / height, height / width)
     aside = tangent * (2 + 2 * max(map(abs, sensor.principal_point_offset)))
     near_point = sensor.near_clip * (1 + 2 * aside)  # the farthest point of the near plane in view
     reach = near_point + sensor.aperture_radius * (1 + sensor.near_clip / sensor.focus_distance)
-    for boundary in found.boundaries:
-        lower, upper = shape_bounds(scene.shapes[boundary.shape])
-        if (eye + reach >= lower).all() and (eye - reach <= upper).all():
-            return True
-    return False
+    return eye - reach, eye + reach

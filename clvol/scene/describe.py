@@ -158,9 +158,13 @@ def _scene_lines(scene: records.Scene) -> Iterator[str]:
         yield f"files    {listed(scene.files, MOST_FILES)}"
 
 
-def _camera(sensor: records.Perspective) -> str:
-    position, fov = _point(sensor.to_world[:3, 3]), _number(sensor.fov)
+def _camera(sensor: records.Camera) -> str:
+    position = _point(sensor.to_world[:3, 3])
     inside = f", in {_medium(sensor.medium)}" if sensor.medium else ""
+    if isinstance(sensor, records.Orthographic):
+        width = _number(2 * float(np.linalg.norm(sensor.to_world[:3, 0])))
+        return f"orthographic at {position}, {width} wide{inside}"
+    fov = _number(sensor.fov)
     if not sensor.aperture_radius:
         return f"perspective at {position}, field of view {fov} degrees{inside}"
     radius, distance = _number(sensor.aperture_radius), _number(sensor.focus_distance)

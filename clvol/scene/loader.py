@@ -29,7 +29,11 @@ PLUGINS: PluginTable = {
         "path": integrator.path,
         "moment": integrator.moment,
     },
-    "sensor": {"perspective": sensor.perspective, "thinlens": sensor.thinlens},
+    "sensor": {
+        "perspective": sensor.perspective,
+        "thinlens": sensor.thinlens,
+        "orthographic": sensor.orthographic,
+    },
     "film": {"hdrfilm": sensor.hdrfilm},
     "rfilter": {
         "box": sensor.box,

@@ -78,12 +78,22 @@ def _colour(owner: Any, name: str, maximum: float) -> Parameter:
 
 def _sensor(sensor: records.Sensor, seen: set[int]) -> Found:
     camera, film = sensor.camera, sensor.film
-    yield "to_world", _field(camera, "to_world", values.matrix(values.rigid), values.frozen)
+    if isinstance(camera, records.Orthographic):
+        yield "to_world", _field(camera, "to_world", values.matrix(values.invertible), values.frozen)
+    else:
+        yield "to_world", _field(camera, "to_world", values.matrix(values.rigid), values.frozen)
+        yield from _perspective(camera, film)
+    for name in ("near_clip", "far_clip"):
+        yield name, _field(camera, name, values.number(0.0, exclusive=True))
+    yield from _film(film)
+    if camera.medium is not None:
+        yield from _nested("medium", _medium(camera.medium, seen))
+
+
+def _perspective(camera: records.Perspective, film: records.Film) -> Found:
     x_fov = float(np.degrees(field_of_view_x(camera, film)))
     degrees = values.number(0.0, 180.0, exclusive=True)
     yield "x_fov", Parameter(camera, x_fov, degrees, lambda c, v: replace(c, fov=v, fov_axis="x"))
-    for name in ("near_clip", "far_clip"):
-        yield name, _field(camera, name, values.number(0.0, exclusive=True))
     for axis, letter in enumerate("xy"):
 
         def offset(c: Any, value: float, axis: int = axis) -> Any:
@@ -95,9 +105,6 @@ def _sensor(sensor: records.Sensor, seen: set[int]) -> Found:
         yield f"principal_point_offset_{letter}", Parameter(camera, now, values.number(), offset)
     yield "aperture_radius", _field(camera, "aperture_radius", values.number(0.0))
     yield "focus_distance", _field(camera, "focus_distance", values.number(0.0, exclusive=True))
-    yield from _film(film)
-    if camera.medium is not None:
-        yield from _nested("medium", _medium(camera.medium, seen))
 
 
 def _film(film: records.Film) -> Found:

@@ -151,6 +151,11 @@ def rigid(matrix: np.ndarray) -> str:
     return "" if is_rigid(matrix) else "must not scale or shear"
 
 
+def invertible(matrix: np.ndarray) -> str:
+    """Any transform: whatever can be none is an error before."""
+    return ""
+
+
 def unstretched(matrix: np.ndarray) -> str:
     """The transform of an environment or a spot."""
     return "" if keeps_angles(matrix) else "must not stretch or shear"
@@ -259,8 +264,8 @@ def check_together(record: Any, name: str) -> None:
 
 def _fault(record: Any) -> str:
     match record:
-        case records.Perspective(near_clip=near, far_clip=far) if far <= near:
-            return f"far_clip ({far:g}) must be beyond near_clip ({near:g})"
+        case records.Perspective() | records.Orthographic() if record.far_clip <= record.near_clip:
+            return f"far_clip ({record.far_clip:g}) must be beyond near_clip ({record.near_clip:g})"
         case records.Film():
             x, y, width, height = record.window
             if x + width > record.width or y + height > record.height:

@@ -18,6 +18,8 @@ from clvol.scene.materials import Bsdf, Null
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from numpy.typing import ArrayLike
+
     from clvol.volumes.grid import Grid
     from clvol.volumes.transfer import Transfer, Transfers
 
@@ -99,6 +101,38 @@ class Perspective:
     aperture_radius: float = 0.0
     focus_distance: float = 1.0
     medium: Medium | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Orthographic:
+    """Camera of parallel rays along local +z; local +x is the image's left.
+
+    Under `to_world` the film is 2 wide about local (0, 0), and as high as its pixels say.  `near_clip` is
+    along local z, rays end far_clip - near_clip farther on in the world.
+    `medium`: what the scene says the camera is in; what shapes hold round it is found without.
+    """
+
+    to_world: np.ndarray
+    near_clip: float = 1e-2
+    far_clip: float = 1e4
+    medium: Medium | None = None
+
+    def at(self, x: ArrayLike, y: ArrayLike, film: Film) -> np.ndarray:
+        """Points of the near plane at film positions, in pixels from its corner, float64 (..., 3)."""
+        across, down = np.asarray(x) / film.width, np.asarray(y) / film.height
+        height = film.height / film.width
+        local = [1 - 2 * across, height * (1 - 2 * down), np.full(np.shape(across), self.near_clip)]
+        points: np.ndarray = np.stack(local, axis=-1) @ self.to_world[:3, :3].T + self.to_world[:3, 3]
+        return points
+
+    @property
+    def forward(self) -> np.ndarray:
+        """Where all rays go, unit, float64 (3,)."""
+        along: np.ndarray = self.to_world[:3, 2] / np.linalg.norm(self.to_world[:3, 2])
+        return along
+
+
+Camera = Perspective | Orthographic
 
 
 @dataclass(frozen=True, eq=False)
@@ -325,7 +359,7 @@ class Sampler:
 class Sensor:
     """A camera with its film and sampler."""
 
-    camera: Perspective
+    camera: Camera
     film: Film
     sampler: Sampler
     name: str = ""
@@ -339,7 +373,7 @@ class Scene:
     `sensors` are all that the scene has, in its order (`clvol.scene.views.seen_by` takes another).
     """
 
-    sensor: Perspective
+    sensor: Camera
     film: Film
     integrator: Integrator
     shapes: tuple[Shape, ...] = ()

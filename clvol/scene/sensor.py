@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.scene.reader import BRIGHTEST
-from clvol.scene.records import Film, Perspective, ReconstructionFilter, Sampler, Sensor
+from clvol.scene.records import Camera, Film, Orthographic, Perspective, ReconstructionFilter, Sampler, Sensor
 
 if TYPE_CHECKING:
     from clvol.scene.reader import Reader
@@ -44,14 +44,25 @@ def thinlens(reader: Reader) -> Sensor:
 def _pinhole(reader: Reader) -> Perspective:
     """What every perspective camera has: its place, field of view, near and far plane."""
     fov, fov_axis = _field_of_view(reader)
+    return Perspective(_rigid(reader), fov, fov_axis, *_clip(reader))
+
+
+def orthographic(reader: Reader) -> Sensor:
+    """The `orthographic` plugin: parallel rays; `to_world` scales the film, which is 2 wide without."""
+    reader.ignore(focus_distance=float)
+    return _sensor(reader, Orthographic(reader.transform(), *_clip(reader)))
+
+
+def _clip(reader: Reader) -> tuple[float, float]:
+    """The distances of the near and the far plane."""
     near = reader.number("near_clip", 1e-2, minimum=0.0, open_interval=True)
     far = reader.number("far_clip", 1e4)
     if far <= near:
         reader.fail(f"far_clip ({far:g}) must be beyond near_clip ({near:g})", "far_clip")
-    return Perspective(_rigid(reader), fov, fov_axis, near, far)
+    return near, far
 
 
-def _sensor(reader: Reader, camera: Perspective) -> Sensor:
+def _sensor(reader: Reader, camera: Camera) -> Sensor:
     """`camera` with the film and sampler inside the sensor."""
     film_node, sampler_node = reader.only_child("film"), reader.only_child("sampler")
     medium = reader.only_child("medium")

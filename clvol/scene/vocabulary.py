@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 LATER: dict[str, tuple[str, ...]] = {
     "integrator": ("direct", "aov", "depth", "ptracer"),
-    "sensor": ("orthographic", "radiancemeter", "irradiancemeter", "distant", "batch"),
+    "sensor": ("radiancemeter", "irradiancemeter", "distant", "batch"),
     "film": ("specfilm",),
     "shape": (
         *("mesh", "instance", "shapegroup", "bsplinecurve", "linearcurve", "sdfgrid"),

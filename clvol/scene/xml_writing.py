@@ -10,6 +10,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from clvol.scene.loader import PLUGINS
+from clvol.scene.sensor import is_rigid
 
 Attach = Callable[[str, np.ndarray], str]
 """Puts an array where a scene can name it, by the parameter that has it; the file's name."""
@@ -70,7 +71,7 @@ def _value(name: str, value: Any, owner: Mapping[str, Any], attach: Attach) -> l
         return [f'<string name="{FILE_OF[name]}" value={quoteattr(file)}/>']
     array = np.asarray(value, np.float64)
     if array.shape == (4, 4):
-        steps = _look_at(array) if _kind(owner) == "sensor" else _steps(array)
+        steps = _look_at(array) if _kind(owner) == "sensor" and is_rigid(array) else _steps(array)
         return [f"<transform {label}>", *("    " + step for step in steps), "</transform>"]
     x, y, z = (_numbers(one) for one in array)
     return [f'<vector {label} x="{x}" y="{y}" z="{z}"/>']

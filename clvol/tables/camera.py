@@ -1,10 +1,12 @@
-"""The perspective camera as the device needs it: rays that are affine in the pixel position.
+"""Cameras as the device needs them: rays that are affine in the pixel position.
 
 Everything is worked out in double.  Rays do not start at the pinhole but on the plane that lies just
 before the scene's bounding sphere (or the near plane): a float position there keeps its precision
 however far away the camera stands.  Rays of a thin lens start on that plane as well: there they are as far
 from the pinhole's as their point of the lens from its centre, shrunk in proportion to the depth still to go
 to the plane in focus, where all of a film position's rays meet (Kolb, Mitchell, Hanrahan 1995).
+
+Parallel rays have one direction, and places that are affine in the pixel position.
 """
 
 from __future__ import annotations
@@ -15,10 +17,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from clvol.scene.records import Orthographic
 from clvol.scene.sensor import field_of_view_x
 
 if TYPE_CHECKING:
-    from clvol.scene.records import Film, Perspective
+    from clvol.scene.records import Camera, Film, Perspective
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +33,8 @@ class CameraRays:
 
     A point (u, v) of the unit disk is l = u lens_x + v lens_y of a thin lens; it moves the origin by
     lens_start l and the direction, before it is normalised, by -lens_bend l.
+
+    Of `parallel` rays the base is unit and they have no lens.
     """
 
     eye: np.ndarray
@@ -45,13 +50,58 @@ class CameraRays:
     lens_y: np.ndarray
     lens_start: float
     lens_bend: float
+    parallel: bool = False
+
+    def place(self, points: np.ndarray) -> np.ndarray:
+        """Where points (n, 3) are seen: x, y, and the parameter along the ray, > 0 in front; (3, n)."""
+        along = (self.dx, self.dy, self.base) if self.parallel else (self.base_dx, self.base_dy, self.base)
+        start = self.position if self.parallel else self.eye
+        a, b, depth = np.linalg.solve(np.column_stack(along), (points - start).T)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            seen = (a, b) if self.parallel else (a / depth, b / depth)
+        return np.stack([*seen, depth])
+
+    def distance(self, point: np.ndarray) -> float:
+        """Distance of a point from the camera: its pinhole, or the plane through its place."""
+        way = point - self.eye
+        return float(way @ self.forward) if self.parallel else float(np.linalg.norm(way))
 
 
-def camera_rays(sensor: Perspective, film: Film, centre: np.ndarray, radius: float) -> CameraRays:
+def camera_rays(sensor: Camera, film: Film, centre: np.ndarray, radius: float) -> CameraRays:
     """Rays of `sensor`, relative to `centre`; `radius` bounds everything they can hit (world units).
 
-    The field of view is that of the whole film; a crop cuts its window out of it.
+    What is seen is that of the whole film; a crop cuts its window out of it.
     """
+    if isinstance(sensor, Orthographic):
+        return _parallel_rays(sensor, film, centre, radius)
+    return _perspective_rays(sensor, film, centre, radius)
+
+
+def _parallel_rays(sensor: Orthographic, film: Film, centre: np.ndarray, radius: float) -> CameraRays:
+    left, top, width, height = film.window
+    x, y = left + np.array([0, width, 0, width]), top + np.array([0, 0, height, height])
+    corners = sensor.at(x, y, film) - centre
+    forward, nothing = sensor.forward, np.zeros(3)
+    start = max(0.0, float(-(corners @ forward).max()) - radius)
+    return CameraRays(
+        eye=sensor.to_world[:3, 3] - centre,
+        position=corners[0] + start * forward,
+        dx=(corners[1] - corners[0]) / width,
+        dy=(corners[2] - corners[0]) / height,
+        base=forward,
+        base_dx=nothing,
+        base_dy=nothing,
+        forward=forward,
+        far=sensor.far_clip - sensor.near_clip - start,
+        lens_x=nothing,
+        lens_y=nothing,
+        lens_start=0.0,
+        lens_bend=0.0,
+        parallel=True,
+    )
+
+
+def _perspective_rays(sensor: Perspective, film: Film, centre: np.ndarray, radius: float) -> CameraRays:
     tangent = math.tan(field_of_view_x(sensor, film) / 2)
     linear, eye = sensor.to_world[:3, :3], sensor.to_world[:3, 3] - centre
     offset_x, offset_y = sensor.principal_point_offset

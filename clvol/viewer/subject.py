@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from clvol.errors import OptionError
 from clvol.scene.assignments import value_of
 from clvol.scene.boundaries import shape_bounds
 from clvol.scene.parameters import traverse
+from clvol.scene.records import Perspective
 from clvol.scene.transforms import rotate
 from clvol.scene.views import viewed
 from clvol.staging.framing import Axes
@@ -53,6 +55,9 @@ class Subject:
 
     def __post_init__(self) -> None:
         seen = viewed(self.scene, self.sensor)
+        if not isinstance(seen.sensor, Perspective):
+            what = f"the viewer moves perspective cameras, and sensor {self.sensor} is orthographic"
+            raise OptionError(what, self.scene.source, "render it, or add a perspective sensor")
         if not any(self.size):
             self.size = seen.film.window[2:]
         seen = viewed(self.scene, self.sensor, self.size)

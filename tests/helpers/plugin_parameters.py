@@ -114,6 +114,11 @@ PARAMETERS = {
         {"fov": 40.0, "aperture_radius": 0.1},
         CAMERA | {"aperture_radius": 0.2, "focus_distance": 2.0},
     ),
+    "orthographic": (
+        {},
+        {name: CAMERA[name] for name in ("near_clip", "far_clip", "film", "sampler", "medium")}
+        | {"to_world": np.diag([2.0, 1.0, 1.0, 1.0]), "focus_distance": Silent(2.0)},
+    ),
     "hdrfilm": (
         {"width": 8, "height": 9},
         {

@@ -424,8 +424,8 @@ def test_a_spheres_center_and_radius_apply_before_to_world():
         ),
         ({"type": "cube", "bsdf": {"type": "nul"}}, "unknown plugin 'nul'; did you mean 'null'?"),
         (
-            {"type": "serialized", "filename": "a.serialized"},
-            "shape 'serialized' is not supported in this version; supported: cube, sph",
+            {"type": "sdfgrid", "filename": "a.vol"},
+            "shape 'sdfgrid' is not supported in this version; supported: cube, sph",
         ),
         ({"type": "torus"}, "scene.s: unknown plugin 'torus'"),
         ({"type": "cube", "inside": {"type": "homogeneous"}}, "must be its 'interior' or 'exterior'"),

@@ -81,7 +81,7 @@ def find_places(kernels: RayKernels, x: int, y: int) -> list[Place]:
     direction = rays.base + (x + 0.5) * rays.base_dx + (y + 0.5) * rays.base_dy
     direction = direction / np.linalg.norm(direction)
     far = rays.far / float(direction @ rays.forward)
-    to_origin = float(np.linalg.norm(origin - rays.eye))
+    to_origin = rays.distance(origin)
     hits, spans = kernels.places(origin, direction, MOST_SURFACES)
     places = []
     for segment in _segments(prepared, hits, spans, far):
@@ -176,11 +176,10 @@ def pixel_hint(prepared: PreparedScene, x: int, y: int) -> str:
     for is_empty, (lower, upper) in zip(empty, bounds, strict=True):
         if is_empty or not np.isfinite([lower, upper]).all():
             continue
-        towards = (lower + upper) / 2 - prepared.centre - rays.eye
-        a, b, depth = np.linalg.solve(np.column_stack([rays.base_dx, rays.base_dy, rays.base]), towards)
-        if not (depth > 0 and 0 <= a / depth < width and 0 <= b / depth < height):
+        across, down, depth = rays.place((lower + upper) / 2 - prepared.centre)
+        if not (depth > 0 and 0 <= across < width and 0 <= down < height):
             continue
-        middle = int(a / depth), int(b / depth)
+        middle = int(across), int(down)
         if middle != (x, y):
             return f"try {middle[0]} {middle[1]}, towards the middle of a medium"
     return "choose a pixel where the picture shows a medium"
