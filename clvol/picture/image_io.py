@@ -18,6 +18,7 @@ import numpy as np
 
 from clvol.base.image_reading import jpeg_is_whole
 from clvol.errors import OptionError
+from clvol.picture.dither import codes
 from clvol.picture.formats import COMPONENTS, FORMATS, Format
 from clvol.picture.view_transform import View, through_view
 
@@ -102,11 +103,14 @@ def encode_display(
     """Linear radiance (h, w, 3) as a display shows it; with alpha (h, w) colours are divided by it.
 
     Pixels that are NaN or infinite are painted magenta and counted in a warning, so that they are seen.
+    Eight bits are dithered (`clvol.picture.dither`).
     `view` has full names and a number of stops.
     """
-    most = 255 if component == "uint8" else 65535
     display = shown_pixels(image, alpha, view)
-    pixels = np.rint(most * display.astype(np.float64)).astype(COMPONENTS[component])
+    if component == "uint8":
+        pixels = codes(display)
+    else:
+        pixels = np.rint(65535 * display.astype(np.float64)).astype(COMPONENTS[component])
     said: dict[str, Any] = {
         "display": view.display,
         "view_transform": view.transform,

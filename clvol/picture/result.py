@@ -17,6 +17,7 @@ from clvol.base.extras import need
 from clvol.base.output_files import check_spares
 from clvol.errors import OptionError
 from clvol.picture import denoising, image_io
+from clvol.picture.dither import codes
 from clvol.picture.encoding import encode_result, shown_layers
 from clvol.picture.estimate import Estimate, Ranges, error_bias
 from clvol.picture.image_io import ALPHA
@@ -188,8 +189,7 @@ class Result:
     @property
     def display(self) -> np.ndarray:
         """What a .png shows: uint8 (height, width, 3), or with alpha (height, width, 4)."""
-        shown: np.ndarray = np.rint(255 * image_io.shown_pixels(*shown_layers(self), View().resolved()))
-        return shown.astype(np.uint8)
+        return codes(image_io.shown_pixels(*shown_layers(self), View().resolved()))
 
     def to_pil(self) -> Any:
         """`display` as a ``PIL.Image.Image``; OptionError where Pillow is missing."""

@@ -13,6 +13,7 @@ from click.testing import CliRunner
 
 from clvol.cli.main import main
 from clvol.errors import OptionError
+from clvol.picture.dither import codes
 from clvol.picture.estimate import Moments
 from clvol.picture.formats import FORMATS, is_linear
 from clvol.picture.image_io import shown_pixels
@@ -69,7 +70,7 @@ def test_every_format_holds_the_picture(tmp_path: Path, suffix: str) -> None:
         expected, bound = result.image, 0.0 if form.exact else 0.01  # shared exponents have 8 bits
         assert kind == "float"
     else:
-        expected = np.rint(255 * shown_pixels(result.image, None, View().resolved())) / 255
+        expected = codes(shown_pixels(result.image, None, View().resolved())) / 255
         bound = 1e-6 if form.exact else 0.06
         assert kind == usual
     assert np.abs(colours(channels) - expected).max() <= bound
@@ -90,7 +91,8 @@ def test_alpha_is_multiplied_in_where_numbers_are_radiance_and_straight_elsewher
     straight = shown_pixels(result.image, result.alpha, View().resolved())
     np.testing.assert_allclose(channels["A"], straight[..., 3], atol=0.01)
     seen = result.alpha > 0.1
-    assert np.abs(colours(channels) - straight[..., :3])[seen].max() < (0.003 if form.exact else 0.12)
+    expected = codes(straight)[..., :3] / 255
+    assert np.abs(colours(channels) - expected)[seen].max() < (1e-6 if form.exact else 0.12)
 
 
 @pytest.mark.parametrize("suffix", [".jpg", ".hdr", ".pfm", ".ppm"])

@@ -11,6 +11,7 @@ import pytest
 
 from clvol.errors import OptionError
 from clvol.picture import image_io
+from clvol.picture.dither import codes
 from clvol.picture.estimate import Moments
 from clvol.picture.merging import merge
 from clvol.picture.result import Result, relative_noise
@@ -230,7 +231,7 @@ def test_png_shows_the_picture_with_metadata_as_text(tmp_path: Path) -> None:
     result = make_result(0, 4)
     result.save(tmp_path / "a.PNG")
     channels, attributes = read(tmp_path / "a.PNG")
-    expected = np.rint(255 * image_io.shown_pixels(result.image, None, View().resolved()))
+    expected = codes(image_io.shown_pixels(result.image, None, View().resolved()))
     np.testing.assert_array_equal(channels["G"], expected[..., 1])
     assert attributes["technique"] == "delta" and attributes["spp"] == "4"
     assert attributes["Software"] == "clvol 0.1.0" and attributes["exposure"] == "0"
