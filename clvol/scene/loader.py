@@ -10,7 +10,19 @@ from typing import TYPE_CHECKING, Any
 
 from clvol.base.files import files_noted
 from clvol.errors import Error, SceneError, shown
-from clvol.scene import bsdf, classified, emitter, integrator, medium, phase, sensor, shape, texture, volume
+from clvol.scene import (
+    bsdf,
+    classified,
+    emitter,
+    groups,
+    integrator,
+    medium,
+    phase,
+    sensor,
+    shape,
+    texture,
+    volume,
+)
 from clvol.scene.library import Grids, Library, PluginTable
 from clvol.scene.mesh_files import FORMATS
 from clvol.scene.nodes import Node, from_dict
@@ -54,6 +66,9 @@ PLUGINS: PluginTable = {
         "disk": shape.disk,
         "cylinder": shape.cylinder,
         **dict.fromkeys(FORMATS, shape.mesh),
+        "shapegroup": groups.shapegroup,
+        "instance": groups.instance,
+        "merge": groups.merge,
     },
     "bsdf": {
         "null": bsdf.null,
@@ -236,14 +251,15 @@ def _build(root: Node, source: str, grids: Grids | None = None) -> Scene:
             seen.add(id(node))
             records[library.kind_of(node)].append((node, build(node, library)))
     sensors = _sensors(records["sensor"], root)
+    shapes = groups.all_shapes(record for _, record in records["shape"])
     emitters = [(node, light) for node, light in records["emitter"] if not _is_inside(node, light, library)]
     _check_emitters(emitters)
     _check_used(records, library)
     return Scene(
         sensor=sensors[0].camera,
         film=sensors[0].film,
-        integrator=_integrator(records["integrator"], _what_has_media(sensors, records["shape"])),
-        shapes=tuple(record for _, record in records["shape"]),
+        integrator=_integrator(records["integrator"], _what_has_media(sensors, shapes)),
+        shapes=shapes,
         emitters=tuple(replace(record, name=node.id) for node, record in emitters),
         spp=sensors[0].sampler.spp,
         seed=sensors[0].sampler.seed,
@@ -298,11 +314,11 @@ def _check_emitters(emitters: list[tuple[Node, object]]) -> None:
             )
 
 
-def _what_has_media(sensors: tuple[Sensor, ...], shapes: list[tuple[Node, Shape]]) -> str:
+def _what_has_media(sensors: tuple[Sensor, ...], shapes: tuple[Shape, ...]) -> str:
     """The first thing in the scene that names a medium, "" without."""
     if any(sensor.camera.medium is not None for sensor in sensors):
         return "sensor"
-    for _, record in shapes:
+    for record in shapes:
         if record.interior or record.exterior:
             return f"shape '{record.name}'" if record.name else "shape"
     return ""

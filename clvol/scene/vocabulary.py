@@ -19,8 +19,8 @@ LATER: dict[str, tuple[str, ...]] = {
     "sensor": ("radiancemeter", "irradiancemeter", "distant", "batch"),
     "film": ("specfilm",),
     "shape": (
-        *("mesh", "instance", "shapegroup", "bsplinecurve", "linearcurve", "sdfgrid"),
-        *("ellipsoids", "heightfield", "merge"),
+        *("mesh", "bsplinecurve", "linearcurve", "sdfgrid"),
+        *("ellipsoids", "heightfield"),
     ),
     "bsdf": ("principled", "bumpmap", "normalmap", "blendbsdf"),
     "phase": ("sggx", "tabphase"),

@@ -14,10 +14,11 @@ import numpy as np
 
 from clvol import layout
 from clvol.accel.bvh import Bvh, build_bvh, check_mesh, drop_degenerate
+from clvol.base.memory import available_memory, format_bytes
 from clvol.errors import SceneError
 from clvol.scene.boundaries import Boundaries, shape_bounds
 from clvol.scene.material_facts import is_transmissive, passes_light
-from clvol.scene.mesh import mesh_flaws
+from clvol.scene.mesh import MAX_INDICES, mesh_flaws
 from clvol.scene.orientation import facing_outwards
 from clvol.scene.primitives import QUADRICS, mesh_of
 from clvol.tables.affine import centred, rows_3x4
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 log = logging.getLogger("clvol")
 
 _CHUNK = 1 << 17
+_BYTES_A_VERTEX, _BYTES_A_TRIANGLE = 32, 128
+"""Of the arrays here, and of what the hierarchy is built from, at its peak."""
 INWARDS = "triangles that face inwards"
 
 
@@ -110,6 +113,7 @@ def _triangles(
     """Vertices, faces, normals and uvs of all meshes in one; writes into `table` who has the last two."""
     found = [(n, s, mesh_of(s)) for n, s in meshes]
     total = sum(len(m.vertices) for _, _, m in found)
+    _check_memory(total, sum(len(m.faces) for _, _, m in found))
     vertices = np.empty((total, 3), np.float32)
     faces = np.empty((sum(len(m.faces) for _, _, m in found), 4), np.uint32)
     normals = np.zeros((total, 3), np.float32) if any(m.normals is not None for _, _, m in found) else None
@@ -141,6 +145,15 @@ def _triangles(
         first += len(here)
         filled += len(kept)
     return vertices, faces[:filled], normals, uvs
+
+
+def _check_memory(vertices: int, triangles: int) -> None:
+    """Raises SceneError for more than can be numbered or held: instances make many of few."""
+    needed, free = _BYTES_A_VERTEX * vertices + _BYTES_A_TRIANGLE * triangles, available_memory()
+    if max(3 * triangles, vertices) > MAX_INDICES or (free is not None and needed > free):
+        what = f"with all instances there are {triangles:,} triangles, which take {format_bytes(needed)}"
+        have = "" if free is None else f" and {format_bytes(free)} are free"
+        raise SceneError(what + have, hint="use fewer instances, or coarser meshes")
 
 
 def _transform(points: np.ndarray, linear: np.ndarray, offset: np.ndarray, out: np.ndarray) -> None:

@@ -148,6 +148,12 @@ PARAMETERS = {
     "rectangle": ({}, SHAPE | {"face_normals": Silent(True)}),
     "disk": ({}, SHAPE),
     "cylinder": ({}, SHAPE | {"p0": [1, 2, 3], "p1": [1, 2, 3], "radius": 2.0}),
+    "shapegroup": ({"inner": {"type": "cube"}}, {"inner": {"type": "sphere"}, "to_world": Silent(MOVED)}),
+    "instance": (
+        {"group": {"type": "shapegroup", "inner": {"type": "cube"}}},
+        {"group": {"type": "shapegroup", "inner": {"type": "sphere"}}, "to_world": MOVED},
+    ),
+    "merge": ({"inner": {"type": "cube"}}, {"inner": {"type": "sphere"}}),
     "obj": ({"filename": "a.obj"}, MESH | {"filename": "b.obj", "flip_tex_coords": False}),
     "ply": (
         {"filename": "a.ply"},
