@@ -50,6 +50,7 @@ if TYPE_CHECKING:
         look_at,
         rotate,
         scale,
+        skip_unsupported,
         translate,
         traverse,
     )
@@ -101,6 +102,7 @@ __all__ = [
     "scale",
     "selftest",
     "show",
+    "skip_unsupported",
     "trace_ray",
     "transfer",
     "translate",
@@ -140,6 +142,7 @@ _MODULES = {
         "look_at",
         "rotate",
         "scale",
+        "skip_unsupported",
         "translate",
         "traverse",
     ],

@@ -106,6 +106,8 @@ class Error(Exception):
     """
 
     longest = LONGEST
+    whole = False
+    """Whether the message has several lines that are to stay so."""
     in_scene = False
     """Whether it is about what a scene's file says."""
 
@@ -137,6 +139,7 @@ class DeviceError(Error):
     """No usable OpenCL device, or a kernel that does not build on it (with the whole log)."""
 
     longest = sys.maxsize
+    whole = True
 
 
 class RenderError(Error):

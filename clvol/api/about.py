@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 from clvol.api.renders import plan
 from clvol.device.device import list_devices
-from clvol.errors import DeviceError, OptionError, Told, printable, shown
+from clvol.errors import DeviceError, Error, OptionError, SceneError, Told, printable, shown
+from clvol.lab.quiet import log_filter
 from clvol.picture.loading import load_result
 from clvol.picture.result import Result
 from clvol.planning.in_force import warnings
 from clvol.planning.registry import FAMILIES
 from clvol.scene.describe import describe_scene, describe_volume
+from clvol.scene.faults import skip_unsupported
 from clvol.scene.loader import load_file
 from clvol.scene.records import Scene
 from clvol.version import __version__
@@ -104,10 +106,30 @@ def _lines(what: object, grid: str | None, choices: dict[str, Any]) -> list[str]
         hint = "give a scene, a result, or the name of a file"
         raise OptionError(f"info does not know what {shown(what)} is", hint=hint)
     if is_scene:
-        return scene_lines(load_file(Path(what)), choices)
+        return scene_file_lines(what, {}, choices)
     if Path(what).suffix.lower() == ".exr":
         return _result_lines(load_result(what))
     return describe_volume(str(what), grid)
+
+
+def scene_file_lines(
+    path: str | PathLike[str], definitions: dict[str, str], choices: dict[str, Any]
+) -> list[str]:
+    """`scene_lines` of a scene's file, without what is not supported in it, which has lines of its own."""
+    with log_filter(lambda record: False):
+        try:
+            scene = load_file(Path(path), **definitions)
+        except SceneError as faults:
+            try:
+                with skip_unsupported():
+                    scene = load_file(Path(path), **definitions)
+            except Error:
+                raise faults from None  # they are not all of what can be left out
+    return [
+        *scene_lines(scene, choices),
+        *(f"refused  {said}" for said in scene.left_out),
+        *(f"taken    {said}" for said in scene.approximated),
+    ]
 
 
 def scene_lines(scene: Scene, choices: dict[str, Any]) -> list[str]:

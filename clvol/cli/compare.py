@@ -16,6 +16,7 @@ from clvol.cli.options import (
     device_option,
     positive_option,
     quiet_option,
+    skip_option,
 )
 
 EXAMPLES = """
@@ -88,6 +89,7 @@ def _names_options(command: F) -> F:
 @click.option("--seed", type=click.IntRange(min=0), help="Of the first render; the scene's own by default.")
 @device_option
 @definitions_option
+@skip_option
 @quiet_option
 def compare(
     scene: str, output: str, definitions: tuple[tuple[str, str], ...], quiet: bool, **options: Any

@@ -39,7 +39,8 @@ def info(file: str, grid: str | None, definitions: tuple[tuple[str, str], ...], 
     FILE is a volume (.vdb, .nvdb, .vol, .npy, .npz, medical images, .tif, .h5 and others, see the formats in
     the documentation): its grids, sizes, boxes, values and memory; a picture that clvol wrote (.exr): how it
     was made; or a scene (.xml): its camera, film, media and lights, and the plan of its render: the choices
-    that are in force and why, its features, its stages and what is compiled.  The choices below are those of
+    that are in force and why, its features, its stages and what is compiled; what of
+    it is refused as not supported, and what is taken as something else.  The choices below are those of
     `clvol render`.
     """
     if Path(file).suffix.lower() == ".xml":
@@ -65,8 +66,7 @@ def info(file: str, grid: str | None, definitions: tuple[tuple[str, str], ...], 
 
 def _tell_scene(file: str, definitions: dict[str, str], choices: dict[str, Any]) -> None:
     """Print what a scene contains, and the plan of its render with these choices."""
-    import clvol
-    from clvol.api.about import scene_lines
+    from clvol.api.about import scene_file_lines
 
-    lines = scene_lines(clvol.load_file(file, **definitions), choices)
+    lines = scene_file_lines(file, definitions, choices)
     tell(printable(spelled_out(line, command=True)) for line in lines)

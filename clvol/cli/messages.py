@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from clvol.base.interrupts import ENDING, interruptible
-from clvol.errors import DeviceError, Error, Told, printable, shortened, spelled_out
+from clvol.errors import Error, Told, printable, shortened, spelled_out
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -57,10 +57,8 @@ class OneLineErrors(click.Group):
                 fail(_usage_message(error))
             except click.ClickException as error:
                 fail(error.format_message())
-            except DeviceError as error:
-                fail(error.told(command=True), whole=True)
             except Error as error:
-                fail(error.told(command=True))
+                fail(error.told(command=True), error.whole)
             except OSError as error:
                 fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
             except MemoryError as error:
@@ -84,7 +82,7 @@ def check_once(command: click.Command, ctx: click.Context, arguments: Sequence[s
 
 
 def fail(message: str, whole: bool = False) -> NoReturn:
-    """Print one line on standard error, or the `whole` text (a build log), and exit with status 2."""
+    """Print one line on standard error, or the `whole` text (a build log, a list), and exit with status 2."""
     line = message if whole else printable(shortened(" ".join(message.split()), LONGEST_LINE))
     mention([f"clvol: error: {line}"], err=True)
     sys.exit(USER_ERROR)

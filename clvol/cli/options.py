@@ -175,6 +175,23 @@ definitions_option = click.option(
     metavar="NAME=VALUE",
     help="Fill $NAME in the scene.",
 )
+
+
+def _skipping(ctx: click.Context, param: click.Parameter, value: bool) -> None:
+    """Scenes are loaded without what is not supported as long as the command runs."""
+    if value:
+        from clvol.scene.faults import skip_unsupported
+
+        ctx.with_resource(skip_unsupported())
+
+
+skip_option = click.option(
+    "--skip-unsupported",
+    is_flag=True,
+    expose_value=False,
+    callback=_skipping,
+    help="Leave out what is not supported in the scene, and say so.",
+)
 assignments_option = click.option(
     "--set",
     "assignments",

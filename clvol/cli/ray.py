@@ -17,6 +17,7 @@ from clvol.cli.options import (
     majorant_scale_option,
     outputs_option,
     quiet_option,
+    skip_option,
     step_option,
 )
 
@@ -66,6 +67,7 @@ watched one by one."""
 @click.option("--seed", type=click.IntRange(min=0), help="Same seed, same walks; the scene's own by default.")
 @device_option
 @definitions_option
+@skip_option
 @quiet_option
 def ray(
     scene: str,

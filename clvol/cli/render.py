@@ -23,6 +23,7 @@ from clvol.cli.options import (
     outputs_option,
     positive_option,
     quiet_option,
+    skip_option,
     step_option,
 )
 from clvol.cli.painter import Painter
@@ -127,6 +128,7 @@ class RenderCommand(ExplainedCommand):
 @click.option("--seed", type=click.IntRange(min=0), help="Same seed, same bits; the scene's own by default.")
 @device_option
 @definitions_option
+@skip_option
 @assignments_option
 @picture_options
 @click.option(

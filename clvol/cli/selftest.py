@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from clvol.cli.messages import exit_by, mention
-from clvol.cli.options import definitions_option, device_option, positive_option
+from clvol.cli.options import definitions_option, device_option, positive_option, skip_option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -52,6 +52,7 @@ Ctrl-C.
 )
 @device_option
 @definitions_option
+@skip_option
 def selftest(
     scene: str,
     quick: bool,

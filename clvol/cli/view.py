@@ -17,6 +17,7 @@ from clvol.cli.options import (
     definitions_option,
     device_option,
     family_options,
+    skip_option,
 )
 from clvol.cli.pictures import Stops
 from clvol.cli.volumes import Asked, Background, spelled, volume_options, write_looks
@@ -68,6 +69,7 @@ class ViewCommand(ExplainedCommand):
 @click.option("--seed", type=click.IntRange(min=0), help="Same seed, same bits; the scene's own by default.")
 @device_option
 @definitions_option
+@skip_option
 @assignments_option
 @click.option(
     "--host",

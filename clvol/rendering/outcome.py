@@ -18,8 +18,11 @@ if TYPE_CHECKING:
     from clvol.picture.estimate import Estimate
     from clvol.planning.plan import Plan
     from clvol.rendering.session import Session
+    from clvol.scene.records import Scene
 
 log = logging.getLogger("clvol")
+MOST_SAID = 20
+"""Parts of a scene that its pictures' metadata have by name."""
 LARGE_WEIGHT = 100.0
 """Paths that weigh so much more than others are rare: few samples do not show them."""
 
@@ -78,7 +81,7 @@ def metadata_of(session: Session, first: int, samples: np.ndarray) -> dict[str, 
         **({"channels_apart": f"1 : {apart:.3g}"} if apart else {}),
         **({"pixel_format": scene.film.pixel_format} if scene.film.has_alpha else {}),
         **_repairs(session),
-        **({"approximated": "; ".join(scene.approximated)} if scene.approximated else {}),
+        **_departures(scene),
         "spp": int(samples[0]) if even else round(float(samples.mean()), 3),
         **said_ranges(((first, int(samples.max())),)),
         "seed": session.seed,
@@ -86,6 +89,15 @@ def metadata_of(session: Session, first: int, samples: np.ndarray) -> dict[str, 
         "version": __version__,
         "seconds": round(session.seconds, 4),
     }
+
+
+def _departures(scene: Scene) -> dict[str, str]:
+    """In what the scene is not what its file says."""
+    found = {}
+    for kind, said in (("approximated", scene.approximated), ("left_out", scene.left_out)):
+        more = [f"{len(said) - MOST_SAID:,} more"] if len(said) > MOST_SAID else []
+        found[kind] = "; ".join([*said[:MOST_SAID], *more])
+    return {kind: text for kind, text in found.items() if text}
 
 
 def _repairs(session: Session) -> dict[str, str]:

@@ -3,6 +3,7 @@
 Syntax, defaults and checks live here; nothing of OpenCL, and nothing that reads voxels from a file.
 """
 
+from clvol.scene.faults import skip_unsupported
 from clvol.scene.loader import load_dict, load_file, load_string
 from clvol.scene.parameters import SceneParameters, traverse
 from clvol.scene.transforms import look_at, rotate, scale, translate
@@ -15,6 +16,7 @@ __all__ = [
     "look_at",
     "rotate",
     "scale",
+    "skip_unsupported",
     "translate",
     "traverse",
 ]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from clvol.base.files import note_file, other_kind
 from clvol.errors import SceneError
+from clvol.scene.faults import MissingFileError
 from clvol.volumes.read import split_address
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ def find(name: str, folders: Sequence[Path], where: str, folder_too: bool = Fals
     Raises
     ------
     SceneError
-        At `where`: no such file, or something that is no regular file, such as a pipe.
+        At `where`: no such file (`MissingFileError`), or something that is no regular file, such as a pipe.
     """
     for folder in folders:
         path = folder / name
@@ -38,7 +39,7 @@ def find(name: str, folders: Sequence[Path], where: str, folder_too: bool = Fals
             raise SceneError(f"'{path}' is {kind}, not a file", where)
     looked = ", ".join(str(folder.absolute()) for folder in folders)
     hint = "check the absolute path" if Path(name).is_absolute() else f"looked in {looked}"
-    raise SceneError(f"file '{name}' does not exist", where, hint)
+    raise MissingFileError(f"file '{name}' does not exist", where, hint)
 
 
 def find_parameter(reader: Reader, name: str) -> Path:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from clvol.errors import SceneError
+from clvol.scene.faults import Faults, LostError, UnsupportedError
 from clvol.scene.nodes import Node
 from clvol.scene.vocabulary import LATER, did_you_mean, join_hints, listed
 
@@ -32,19 +33,20 @@ class Library:
     grids : dict, optional
         Volumes that were read before, by file and grid; those read from now on join them.
 
-    Raises
-    ------
-    SceneError
-        Two nodes with the same id.
+    faults : Faults, optional
+        What has been found to be wrong; what is found from now on, as two nodes with the same id, joins it.
     """
 
-    def __init__(self, root: Node, plugins: PluginTable, grids: Grids | None = None) -> None:
+    def __init__(
+        self, root: Node, plugins: PluginTable, grids: Grids | None = None, faults: Faults | None = None
+    ) -> None:
         self.plugins = plugins
+        self.faults = Faults() if faults is None else faults
         self.grids: Grids = {} if grids is None else grids
         self.reduced: dict[int, Any] = {}  # by id() of a grid or volume that `grids` or a record keeps alive
         self.sanitized: dict[tuple[int, bool], Any] = {}  # the same, and whether negative ones stay
         self.taken: set[int] = set()  # id() of every plugin that another one holds or refers to
-        self.built: dict[int, Any] = {}  # records, by id() of their node
+        self.built: dict[int, Any] = {}  # records, by id() of their node; None where there is none
         self.open: list[Node] = []  # what is being built, the outermost first
         self.approximated: list[str] = []  # what is taken as something else, and as what, each once
         self._ids: dict[str, Node] = {}
@@ -58,17 +60,27 @@ class Library:
                 continue
             if value.id in self._ids:
                 first = self._ids[value.id].where
-                raise SceneError(f"the id '{value.id}' is given twice", value.where, f"first at {first}")
-            if value.id:
+                what = f"the id '{value.id}' is given twice"
+                self.faults.note(SceneError(what, value.where, f"first at {first}"))
+            elif value.id:
                 self._ids[value.id] = value
             self._collect_ids(value)
 
     def _add_alias(self, alias: str, target: str, where: str) -> None:
         if alias in self._ids:
-            raise SceneError(f"the id '{alias}' is given twice", where, f"first at {self._ids[alias].where}")
-        if target not in self._ids:
-            raise SceneError(f"alias of an unknown id '{target}'", where, self._known_ids(target))
-        self._ids[alias] = self._ids[target]
+            first = f"first at {self._ids[alias].where}"
+            self.faults.note(SceneError(f"the id '{alias}' is given twice", where, first))
+        elif target in self._ids:
+            self._ids[alias] = self._ids[target]
+        elif self._is_lost(target):
+            self.faults.lost_ids.add(alias)
+        else:
+            what = f"alias of an unknown id '{target}'"
+            self.faults.note(SceneError(what, where, self._known_ids(target)))
+
+    def _is_lost(self, target: str) -> bool:
+        """Whether what has this id may have been in what could not be read."""
+        return target not in self._ids and (target in self.faults.lost_ids or self.faults.lost_file)
 
     def _known_ids(self, wanted: str) -> str:
         return join_hints(did_you_mean(wanted, self._ids), f"ids here: {listed(self._ids)}")
@@ -83,6 +95,8 @@ class Library:
                 raise SceneError(f"unknown parameter '{key}' of 'ref'", node.place(key), "supported: id")
         if not isinstance(target, str):
             raise SceneError("a ref without an id", node.where)
+        if self._is_lost(target):
+            raise LostError(f"'{target}' could not be read", node.where)
         if target not in self._ids:
             raise SceneError(f"ref to an unknown id '{target}'", node.where, self._known_ids(target))
         return self._ids[target]
@@ -104,7 +118,7 @@ class Library:
         if not node.kind and not by_type:
             known = [name for types in self.plugins.values() for name in types]
             hint = join_hints(did_you_mean(node.type, known), f"supported: {listed(known)}")
-            raise SceneError(f"unknown plugin '{node.type}'", node.where, hint)
+            raise UnsupportedError(f"unknown plugin '{node.type}'", node.where, hint)
         return node.kind or by_type
 
     def check_supported(self, node: Node) -> None:
@@ -116,4 +130,4 @@ class Library:
         what, guess = f"unknown {kind} '{node.type}'", did_you_mean(node.type, supported)
         if node.type in LATER.get(kind, ()):
             what, guess = f"{kind} '{node.type}' is not supported in this version", ""
-        raise SceneError(what, node.where, join_hints(guess, f"supported: {listed(supported)}"))
+        raise UnsupportedError(what, node.where, join_hints(guess, f"supported: {listed(supported)}"))

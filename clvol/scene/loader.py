@@ -23,10 +23,11 @@ from clvol.scene import (
     texture,
     volume,
 )
+from clvol.scene.building import build, build_whole
+from clvol.scene.faults import MOST_SKIPPED, EnoughError, Faults, LostError, UnsupportedError
 from clvol.scene.library import Grids, Library, PluginTable
 from clvol.scene.mesh_files import FORMATS
 from clvol.scene.nodes import Node, from_dict
-from clvol.scene.reader import build
 from clvol.scene.records import ConstantEmitter, EnvmapEmitter, Integrator, Scene, Sensor, Shape
 from clvol.scene.vocabulary import listed
 from clvol.scene.xml import read_xml, read_xml_text
@@ -141,7 +142,7 @@ def load_file(path: str | Path, **defaults: object) -> Scene:
     """
     if not isinstance(path, str | os.PathLike):
         raise SceneError(f"load_file takes a file's name, not {shown(path)}", hint="load_dict takes dicts")
-    return _of_xml(lambda: read_xml(Path(path), defaults), source=str(path))
+    return _of_xml(lambda faults: read_xml(Path(path), defaults, faults), source=str(path))
 
 
 def load_string(text: str, **defaults: object) -> Scene:
@@ -168,7 +169,7 @@ def load_string(text: str, **defaults: object) -> Scene:
         raise SceneError(
             f"load_string takes a string of XML, not {shown(text)}", hint="load_dict takes dicts"
         )
-    return _of_xml(lambda: read_xml_text(text, defaults))
+    return _of_xml(lambda faults: read_xml_text(text, defaults, faults))
 
 
 def load_dict(scene: Mapping[str, object]) -> Scene:
@@ -190,7 +191,7 @@ def load_dict(scene: Mapping[str, object]) -> Scene:
     SceneError, VolumeError
         As `load_file`, with a path such as ``scene.shape_1.interior.sigma_t`` for the place.
     """
-    return _loaded(lambda: from_dict(scene))
+    return _loaded(lambda _: from_dict(scene))
 
 
 def load_plugin(plugin: Mapping[str, object], grids: Grids) -> Any:
@@ -199,12 +200,12 @@ def load_plugin(plugin: Mapping[str, object], grids: Grids) -> Any:
     grids : volumes that were read before; those read now join them.
     """
     node = from_dict(plugin, "volume")
-    return build(node, Library(node, PLUGINS, grids))
+    return build_whole(node, Library(node, PLUGINS, grids))
 
 
 def load_staged(scene: Mapping[str, object], source: str, grids: Grids, files: Iterable[str]) -> Scene:
     """As `load_dict`, of a scene made for what `source` names, with volumes that were read from `files`."""
-    return _loaded(lambda: from_dict(scene), source, grids, files)
+    return _loaded(lambda _: from_dict(scene), source, grids, files)
 
 
 def load_sensor(given: Mapping[str, object]) -> tuple[Sensor, set[str]]:
@@ -214,51 +215,58 @@ def load_sensor(given: Mapping[str, object]) -> tuple[Sensor, set[str]]:
     if (kind := library.kind_of(node)) != "sensor":
         raise SceneError(f"'{node.type}' is a {kind}, not a sensor", node.where)
     inside = (value for _, value in node.parameters() if isinstance(value, Node) and not value.is_value)
-    return build(node, library), {library.kind_of(library.resolve(value)) for value in inside}
+    return build_whole(node, library), {library.kind_of(library.resolve(value)) for value in inside}
 
 
-def _of_xml(read: Callable[[], Node], source: str = "") -> Scene:
+def _of_xml(read: Callable[[Faults], Node], source: str = "") -> Scene:
     """As `_loaded`, where what is wrong is to be mended in XML."""
     try:
         return _loaded(read, source)
     except Error as error:
-        error.in_scene = True
+        for one in (error, *getattr(error, "errors", ())):
+            one.in_scene = True
         raise
 
 
 def _loaded(
-    read: Callable[[], Node], source: str = "", grids: Grids | None = None, files: Iterable[str] = ()
+    read: Callable[[Faults], Node], source: str = "", grids: Grids | None = None, files: Iterable[str] = ()
 ) -> Scene:
     """The scene of the nodes that `read` returns, which knows what files it was read from."""
+    faults = Faults()
     with files_noted() as noted:
-        scene = _build(read(), source, grids)
+        try:
+            scene = _build(read(faults), source, grids, faults)
+        except EnoughError:
+            faults.check()
+            raise SceneError(f"more than {MOST_SKIPPED} parts are not supported", source) from None
     return replace(scene, files=tuple(dict.fromkeys((*files, *noted))))
 
 
-def _build(root: Node, source: str, grids: Grids | None = None) -> Scene:
+def _build(root: Node, source: str, grids: Grids | None, faults: Faults) -> Scene:
     if root.type != "scene":
         raise SceneError(f"expected a scene, got a '{root.type}'", root.where)
-    library = Library(root, PLUGINS, grids)
-    records: dict[str, list[tuple[Node, Any]]] = {kind: [] for kind in PLUGINS}
-    seen: set[int] = set()
-    for name, value in root.parameters():
-        if not isinstance(value, Node) or value.is_value:
-            raise SceneError(
-                f"unknown parameter '{name}' of the scene", root.place(name), "it holds plugins only"
-            )
-        node = library.resolve(value)
-        if id(node) not in seen:
-            seen.add(id(node))
-            records[library.kind_of(node)].append((node, build(node, library)))
-    sensors = _sensors(records["sensor"], root)
+    library = Library(root, PLUGINS, grids, faults)
+    records = _records(root, library)
+    sensors = tuple(replace(record, name=node.id) for node, record in records["sensor"])
     shapes = groups.all_shapes(record for _, record in records["shape"])
     emitters = [(node, light) for node, light in records["emitter"] if not _is_inside(node, light, library)]
-    _check_emitters(emitters)
-    _check_used(records, library)
+    chosen = Integrator()
+    try:
+        chosen = _integrator(records["integrator"], _what_has_media(sensors, shapes))
+        _check_emitters(emitters)
+        _check_used(records, library)
+        if not sensors and not faults:
+            hint = 'add a <sensor type="perspective">'
+            raise SceneError("the scene has no sensor", root.where, hint)
+    except SceneError as error:
+        faults.note(error)
+    faults.check()
+    if not sensors:
+        raise SceneError("the scene has no sensor that is supported", root.where)
     return Scene(
         sensor=sensors[0].camera,
         film=sensors[0].film,
-        integrator=_integrator(records["integrator"], _what_has_media(sensors, shapes)),
+        integrator=chosen,
         shapes=shapes,
         emitters=tuple(replace(record, name=node.id) for node, record in emitters),
         spp=sensors[0].sampler.spp,
@@ -266,13 +274,32 @@ def _build(root: Node, source: str, grids: Grids | None = None) -> Scene:
         source=source,
         sensors=sensors,
         approximated=tuple(library.approximated),
+        left_out=tuple(faults.left_out),
     )
 
 
-def _sensors(sensors: list[tuple[Node, Sensor]], root: Node) -> tuple[Sensor, ...]:
-    if not sensors:
-        raise SceneError("the scene has no sensor", root.where, 'add a <sensor type="perspective">')
-    return tuple(replace(record, name=node.id) for node, record in sensors)
+def _records(root: Node, library: Library) -> dict[str, list[tuple[Node, Any]]]:
+    """By kind, the plugins of a scene and what has been made of them, each once."""
+    records: dict[str, list[tuple[Node, Any]]] = {kind: [] for kind in PLUGINS}
+    seen: set[int] = set()
+    for name, value in root.parameters():
+        try:
+            if not isinstance(value, Node) or value.is_value:
+                what = f"unknown parameter '{name}' of the scene"
+                raise UnsupportedError(what, root.place(name), "it holds plugins only")
+            node = library.resolve(value)
+            kind = library.kind_of(node)
+        except LostError:
+            continue
+        except SceneError as error:
+            library.faults.note(error)
+            continue
+        if id(node) not in seen:
+            seen.add(id(node))
+            record = build(node, library)
+            if record is not None:
+                records.setdefault(kind, []).append((node, record))
+    return records
 
 
 def _is_inside(node: Node, record: object, library: Library) -> bool:

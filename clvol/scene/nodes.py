@@ -6,7 +6,7 @@ Nothing here knows what a plugin or a parameter means.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +78,13 @@ class Node(dict[str, Any]):
             raise SceneError(f"'{key}' is given twice in '{self.get('type', self.kind)}'", where)
         self[key] = value
         self.places[key] = where
+
+    def without(self, keys: Container[str]) -> Node:
+        """The node as if these parameters were not given."""
+        left = Node(self.where, self.kind, self.id, self.folders)
+        left.update((key, value) for key, value in self.items() if key not in keys)
+        left.places = self.places
+        return left
 
     def add_nameless(self, value: Node) -> None:
         """Add a plugin that has no name, under one that no file gives."""

@@ -1,7 +1,6 @@
 """Typed access to one node's parameters: reading a parameter is what declares it as supported.
 
-A plugin's function asks for every parameter it knows; then `build`, which makes the record of each node once,
-refuses what is left over.
+A plugin's function asks for every parameter it knows; then `clvol.scene.building` notes what is left over.
 """
 
 from __future__ import annotations
@@ -15,7 +14,8 @@ import numpy as np
 from clvol.base.masks import as_array, masked_count
 from clvol.errors import SceneError, shown
 from clvol.scene import spectra
-from clvol.scene.nodes import MAX_DEPTH, NAMELESS, Node
+from clvol.scene.faults import UnsupportedError
+from clvol.scene.nodes import NAMELESS, Node
 from clvol.scene.transforms import as_matrix
 from clvol.scene.vocabulary import did_you_mean, join_hints, listed
 
@@ -53,6 +53,7 @@ class Reader:
         self.node, self.library = node, library
         self.type = node.type
         self.kind = library.kind_of(node)
+        self.failed_at = ""  # the parameter whose value the last error is about, whatever the others are
         self._asked: list[str] = []
         self._used: set[str] = set()
 
@@ -65,9 +66,17 @@ class Reader:
         return name in self.node
 
     def fail(self, what: str, name: str = "", hint: str = "") -> NoReturn:
-        """Raise a `SceneError` at parameter `name`, or at the plugin itself."""
-        where = self.node.place(name) if name else self.node.where
-        raise SceneError(what, where, hint)
+        """Raise a `SceneError` at parameter `name`, or at the plugin itself: a mistake."""
+        raise SceneError(what, self.place(name), hint)
+
+    def unsupported(self, what: str, name: str = "", hint: str = "") -> NoReturn:
+        """As `fail`, where it is no mistake, and the parameter or plugin can be left out."""
+        self.failed_at = name
+        raise UnsupportedError(what, self.place(name), hint)
+
+    def place(self, name: str) -> str:
+        """Where parameter `name` was written, or without one the plugin."""
+        return self.node.place(name) if name else self.node.where
 
     def raw(self, name: str) -> Any:
         """The value of `name` as it is given, or None."""
@@ -78,6 +87,7 @@ class Reader:
         return self.node[name]
 
     def _wrong(self, name: str, expected: str, value: object) -> NoReturn:
+        self.failed_at = name
         given = f"a '{value.type}'" if isinstance(value, Node) else shown(value)
         self.fail(f"'{name}' of {self.kind} '{self.type}' must be {expected}, got {given}", name)
 
@@ -132,6 +142,7 @@ class Reader:
             self._wrong(name, "a string", value)
         if choices and value not in choices:
             hint = join_hints(did_you_mean(value, choices), f"supported: {listed(choices)}")
+            self.failed_at = name
             self.fail(f"'{name}' of {self.kind} '{self.type}' cannot be '{value}'", name, hint)
         return value
 
@@ -264,8 +275,8 @@ class Reader:
         return found[0][1] if found else None
 
     def build(self, node: Node) -> Any:
-        """The record of a plugin inside; see `build`."""
-        return build(node, self.library)
+        """The record of a plugin inside, which has been built before this one."""
+        return self.library.built[id(node)]
 
     # -- the rest ----------------------------------------------------------------------------------
 
@@ -278,7 +289,7 @@ class Reader:
         said = f"{taken} is taken as {as_what}"
         if said not in self.library.approximated:
             self.library.approximated.append(said)
-            log.warning("%s: %s", self.node.place(name) if name else self.node.where, said)
+            log.warning("%s: %s", self.place(name), said)
 
     def ignore(self, **names: type) -> None:
         """Accept parameters of these types (bool, int, float, str): they do not change the expected image."""
@@ -291,44 +302,37 @@ class Reader:
     def refuse(self, name: str, hint: str = "") -> None:
         """Raise if the scene gives `name`, a known parameter that is not supported yet."""
         if name in self.node:
-            self.fail(f"'{name}' of {self.kind} '{self.type}' is not supported in this version", name, hint)
+            what = f"'{name}' of {self.kind} '{self.type}' is not supported in this version"
+            self.unsupported(what, name, hint)
 
     def refuse_plugin(self, name: str, expected: str = "") -> NoReturn:
-        """Raise for the plugin in parameter `name`: not supported at all, or not here."""
+        """Raise for the plugin in parameter `name`: not supported here."""
         inner = self.library.resolve(self.node[name])
-        self.library.check_supported(inner)
+        takes = f"takes no {self.library.kind_of(inner)} ('{inner.type}')"
+        what = f"{self.kind} '{self.type}' {takes}"
         if expected:
-            self._wrong(name, expected, inner)
-        self.fail(f"{self.kind} '{self.type}' takes no {self.library.kind_of(inner)} ('{inner.type}')", name)
+            what = f"'{name}' of {self.kind} '{self.type}' must be {expected}, got a '{inner.type}'"
+        self.unsupported(what, name)
 
     def finish(self) -> None:
-        """Raise for the first parameter or inner plugin that nobody asked for."""
-        for name, value in self.node.parameters():
-            if name in self._used:
-                continue
-            if name in self._asked:
-                self.fail(f"'{name}' of {self.kind} '{self.type}' has no effect here", name, "leave it out")
-            if isinstance(value, Node) and not value.is_value:
-                inner = self.library.resolve(value)
-                if self.library.kind_of(inner) not in BY_NAME or name.startswith(NAMELESS):
-                    self.refuse_plugin(name)
-            hint = join_hints(did_you_mean(name, self._asked), f"supported: {listed(self._asked)}")
-            self.fail(f"unknown parameter '{name}' of {self.kind} '{self.type}'", name, hint)
+        """Note each parameter or inner plugin that nobody asked for among the faults."""
+        for name in [key for key, _ in self.node.parameters() if key not in self._used]:
+            self.library.faults.note(self._left_over(name))
 
-
-def build(node: Node, library: Library) -> Any:
-    """The record of a node; the same object each time, so that what is shared stays shared."""
-    if id(node) not in library.built:
-        library.check_supported(node)
-        if any(node is outer for outer in library.open) or len(library.open) > MAX_DEPTH:
-            raise SceneError(f"'{node.type}' is nested without end", node.where)
-        library.open.append(node)
-        reader = Reader(node, library)
-        record = library.plugins[reader.kind][node.type](reader)
-        reader.finish()
-        library.open.pop()
-        library.built[id(node)] = record
-    return library.built[id(node)]
+    def _left_over(self, name: str) -> SceneError:
+        value, where = self.node[name], self.place(name)
+        if name in self._asked:
+            return SceneError(
+                f"'{name}' of {self.kind} '{self.type}' has no effect here", where, "leave it out"
+            )
+        if isinstance(value, Node) and not value.is_value:
+            inner = self.library.resolve(value)
+            kind = self.library.kind_of(inner)
+            if kind not in BY_NAME or name.startswith(NAMELESS):
+                what = f"{self.kind} '{self.type}' takes no {kind} ('{inner.type}')"
+                return UnsupportedError(what, where)
+        hint = join_hints(did_you_mean(name, self._asked), f"supported: {listed(self._asked)}")
+        return UnsupportedError(f"unknown parameter '{name}' of {self.kind} '{self.type}'", where, hint)
 
 
 def _float(value: Real) -> float:

@@ -384,6 +384,7 @@ class Scene:
     files: tuple[str, ...] = field(default=(), repr=False)  # all it was read from: nothing replaces them
     sensors: tuple[Sensor, ...] = ()
     approximated: tuple[str, ...] = field(default=(), repr=False)  # what is taken as what
+    left_out: tuple[str, ...] = field(default=(), repr=False)  # what was not supported: places and reasons
     kept: Kept = field(default_factory=Kept, repr=False)
 
     def __post_init__(self) -> None:

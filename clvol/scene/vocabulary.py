@@ -29,6 +29,9 @@ LATER: dict[str, tuple[str, ...]] = {
 }
 """Kind -> plugins known by name and not supported in this version."""
 
+VITAL = ("sigma_t", "values", "albedo", "emission", "temperature")
+"""Parameters that a plugin is lost with, where they are given and cannot be read: it would be another."""
+
 
 LONGEST_NAME = 64
 """Characters of a name beyond which it is not compared, and shown in part."""

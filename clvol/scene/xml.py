@@ -17,6 +17,7 @@ from clvol.base.files import open_regular, other_kind
 from clvol.base.kinds import kind_of_file
 from clvol.errors import SceneError, either, shortened, shown
 from clvol.scene import transforms
+from clvol.scene.faults import Faults, UnsupportedError
 from clvol.scene.files import find
 from clvol.scene.nodes import NAMELESS, Node
 from clvol.scene.vocabulary import did_you_mean, join_hints, listed
@@ -33,7 +34,7 @@ from clvol.scene.xml_values import (
 from clvol.volumes.read import SUFFIXES, is_volume
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
 PLUGIN_TAGS = (
     *("scene", "shape", "bsdf", "medium", "volume", "phase", "emitter"),
@@ -53,13 +54,15 @@ MAX_FILES = 1000
 _REFERENCE = re.compile(r"(?<!\\)\$(\w*)", re.ASCII)
 
 
-def read_xml(path: Path, keywords: Mapping[str, object]) -> Node:
+def read_xml(path: Path, keywords: Mapping[str, object], faults: Faults) -> Node:
     """The scene in XML file `path`, with `keywords` in place of its defaults.
+
+    Elements that cannot be read are noted among the faults, and left out.
 
     Raises
     ------
     SceneError
-        With file and line.
+        With file and line, where there is nothing to go on with.
     """
     if str(path).lstrip().startswith("<"):
         raise SceneError(
@@ -77,7 +80,7 @@ def read_xml(path: Path, keywords: Mapping[str, object]) -> Node:
         )
         raise SceneError(f"'{path}' is a volume, not a scene", hint=hint)
     _check_xml(path)
-    reader = _XmlReader(keywords)
+    reader = _XmlReader(keywords, faults)
     return _finished(reader, reader.file(path, [], ""), keywords, str(path))
 
 
@@ -98,12 +101,12 @@ TEXT = "the text"
 """What errors call XML that is in no file."""
 
 
-def read_xml_text(text: str, keywords: Mapping[str, object]) -> Node:
+def read_xml_text(text: str, keywords: Mapping[str, object], faults: Faults) -> Node:
     """The scene in XML; as `read_xml`, with files looked for in the working directory."""
     if not text.lstrip("\ufeff \t\r\n").startswith("<"):
         hint = "load_file takes the name of a file"
         raise SceneError(f"XML is wanted, got '{shortened(text, 40)}'", hint=hint)
-    reader = _XmlReader(keywords)
+    reader = _XmlReader(keywords, faults)
     return _finished(reader, reader.root(parse_text(text, TEXT), [Path()]), keywords, TEXT)
 
 
@@ -113,20 +116,19 @@ def _finished(reader: _XmlReader, root: Node, keywords: Mapping[str, object], wh
     if root.kind != "scene":
         raise SceneError(f"the root element must be <scene>, not <{root.kind}>", root.where)
     unused = sorted(set(keywords) - reader.used)
-    if unused:
-        names = sorted(set(reader.values) - set(keywords) | reader.used)
-        raise SceneError(
-            f"no ${unused[0]} in the scene uses the value given for '{unused[0]}'",
-            where,
-            join_hints(did_you_mean(unused[0], names), f"the scene's names: {listed(names)}"),
-        )
+    names = sorted(set(reader.values) - set(keywords) | reader.used)
+    for name in () if reader.faults.lost_file else unused:
+        what = f"no ${name} in the scene uses the value given for '{name}'"
+        hint = join_hints(did_you_mean(name, names), f"the scene's names: {listed(names)}")
+        reader.faults.note(SceneError(what, where, hint))
     return root
 
 
 class _XmlReader:
     """State of one scene's reading: the values of $names, which were used, and the files being read."""
 
-    def __init__(self, keywords: Mapping[str, object]) -> None:
+    def __init__(self, keywords: Mapping[str, object], faults: Faults) -> None:
+        self.faults = faults
         self.values = {name: _as_text(value) for name, value in keywords.items()}
         self.used: set[str] = set()
         self.aliases: dict[str, tuple[str, str]] = {}
@@ -144,9 +146,10 @@ class _XmlReader:
         if self.files > MAX_FILES:
             raise SceneError(f"the scene includes more than {MAX_FILES} files", included_at)
         self.reading.append(resolved)
-        node = self.root(parse_elements(path), [path.parent, *folders])
-        self.reading.pop()
-        return node
+        try:
+            return self.root(parse_elements(path), [path.parent, *folders])
+        finally:
+            self.reading.pop()
 
     def root(self, element: Element, folders: list[Path]) -> Node:
         """The node of a document's root, whose files are looked for in `folders`."""
@@ -221,7 +224,12 @@ class _XmlReader:
         node = Node(element.where, element.tag, attributes.get("id", ""), folders)
         node.add("type", attributes["type"], element.where)
         for child in element.children:
-            self.child(child, node)
+            try:
+                self.child(child, node)
+            except SceneError as error:
+                self.faults.note(error)
+                self.faults.lost_ids |= set(_ids_in(child))
+                self.faults.lost_file |= child.tag == "include"
         return node
 
     def child(self, element: Element, parent: Node) -> None:
@@ -257,7 +265,8 @@ class _XmlReader:
             self.directive(element, parent)
         else:
             tags = (*PLUGIN_TAGS[1:], *VALUE_TAGS, *OTHER_TAGS)
-            fail(element, f"unknown element <{tag}>", join_hints(did_you_mean(tag, tags), _only_inside(tag)))
+            hint = join_hints(did_you_mean(tag, tags), _only_inside(tag))
+            raise UnsupportedError(f"unknown element <{tag}>", element.where, hint)
 
     def alias(self, element: Element) -> None:
         """<alias> gives what has one id a second one."""
@@ -360,6 +369,14 @@ def _add_child(parent: Node, name: str, node: Node) -> None:
         parent.add(name, node, node.where)
     else:
         parent.add_nameless(node)
+
+
+def _ids_in(element: Element) -> Iterator[str]:
+    """The ids of a plugin's element and of those inside."""
+    if element.tag in PLUGIN_TAGS:
+        yield from filter(None, [element.attributes.get("id")])
+        for child in element.children:
+            yield from _ids_in(child)
 
 
 def _no_children(element: Element) -> None:

@@ -7,9 +7,9 @@ from clvol import layout
 from clvol.device import programs
 from clvol.device.launch import run_kernel
 from clvol.scene import bsdf, texture
+from clvol.scene.building import build_whole
 from clvol.scene.library import Library
 from clvol.scene.nodes import from_dict
-from clvol.scene.reader import build
 from clvol.tables.materials import material_table
 
 PLUGINS = {
@@ -82,7 +82,7 @@ __kernel void texture_probe(SCENE, __global const int *number, __global const fl
 def read(description):
     """The record of a BSDF or texture that is described in Mitsuba's words."""
     root = from_dict({"type": "scene", "it": description})
-    return build(root["it"], Library(root, PLUGINS))
+    return build_whole(root["it"], Library(root, PLUGINS))
 
 
 def source(kinds, channel=None, textures=True):

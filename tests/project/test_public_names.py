@@ -54,7 +54,9 @@ def test_what_functions_return_is_public() -> None:
         if inspect.isfunction(getattr(clvol, name))
     }
     returned = {name for kind in returned for name in re.findall(r"[\w.]+", kind)}
-    assert returned - {"np.ndarray", "list", "str", "dict", "Any", "Grid"} <= set(clvol.__all__)
+    assert returned - {"np.ndarray", "list", "str", "dict", "Any", "Grid", "Iterator", "None"} <= set(
+        clvol.__all__
+    )
 
 
 def test_nothing_is_imported_before_it_is_used() -> None:

@@ -319,7 +319,7 @@ def test_mixtures_cannot_grow_without_end():
             BLEND | {"weight": grid()},
             "interior.phase.weight: the weight of a blendphase cannot vary",
         ),
-        (BLEND | {"weight": {"type": "bitmap", "filename": "a.png"}}, "give a number from 0 to 1"),
+        (BLEND | {"weight": {"type": "checkerboard"}}, "give a number from 0 to 1"),
         (BLEND | {"weight": {"type": "rgb", "value": [0, 1, 0]}}, "must be a number"),
         ({k: v for k, v in BLEND.items() if k != "weight"}, "needs a weight"),
         ({k: v for k, v in BLEND.items() if k != "a"}, "takes two phase functions, got 1"),

@@ -614,7 +614,7 @@ def test_8_bit_envmaps_are_srgb_decoded(tmp_path):
             "'texture' of emitter 'spot' is not supported",
         ),
         (
-            {"type": "constant", "radiance": {"type": "bitmap", "filename": "a.png"}},
+            {"type": "constant", "radiance": {"type": "checkerboard"}},
             "must be a number, an rgb",
         ),
     ],
