@@ -12,6 +12,9 @@
 #include "phase/isotropic.h"
 #include "phase/kinds.h"
 #include "phase/rayleigh.h"
+#if CLVOL_PHASE_TABPHASE
+#include "phase/tabphase.h"
+#endif
 
 INLINE float lobe_pdf(__global const Phase *lobe, float3 wo, float3 wi)
 {
@@ -19,6 +22,10 @@ INLINE float lobe_pdf(__global const Phase *lobe, float3 wo, float3 wi)
         return hg_pdf(lobe, wo, wi);
     if (IS_PHASE(lobe, RAYLEIGH))
         return rayleigh_pdf(lobe, wo, wi);
+#if CLVOL_PHASE_TABPHASE
+    if (IS_PHASE(lobe, TABPHASE))
+        return tabphase_pdf(lobe, wo, wi);
+#endif
     return isotropic_pdf(lobe, wo, wi);
 }
 
@@ -28,6 +35,10 @@ INLINE float3 lobe_sample(__global const Phase *lobe, float3 wo, float u, float 
         return hg_sample(lobe, wo, u, v, pdf);
     if (IS_PHASE(lobe, RAYLEIGH))
         return rayleigh_sample(lobe, wo, u, v, pdf);
+#if CLVOL_PHASE_TABPHASE
+    if (IS_PHASE(lobe, TABPHASE))
+        return tabphase_sample(lobe, wo, u, v, pdf);
+#endif
     return isotropic_sample(lobe, wo, u, v, pdf);
 }
 

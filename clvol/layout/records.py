@@ -69,8 +69,8 @@ TRANSFER = _record(
 )
 
 PHASE = _record(
-    ("kind", "i", 1),  # PHASE_ISOTROPIC, PHASE_HG, PHASE_RAYLEIGH
-    ("g", "f", 1),
+    ("kind", "i", 1),  # PHASE_ISOTROPIC, PHASE_HG, …
+    ("g", "f", 1),  # of a tabphase: the bits of an int, its table's distance in records
     ("weight", "f", 1),  # share of the medium's phase function; within a medium, the smallest first
 )
 
@@ -206,7 +206,7 @@ RECORDS = {
 
 ENUMS = {
     "SHAPE": ("NONE", "CUBE", "SPHERE"),
-    "PHASE": ("ISOTROPIC", "HG", "RAYLEIGH"),
+    "PHASE": ("ISOTROPIC", "HG", "RAYLEIGH", "TABPHASE"),
     "TRANSFER": ("SIGMA_T", "ALBEDO", "EMISSION"),  # in the order of a medium's entries
     "EMITTER": ("CONSTANT", "ENVMAP", "DIRECTIONAL", "POINT", "SPOT", "AREA"),
     "SURFACE": ("MESH", "SPHERE", "DISK", "CYLINDER"),

@@ -35,6 +35,10 @@ _NUMBERS = (
 """Names in `clvol.layout.constants`, which kernels know by the same."""
 
 
+RARE = ("TABPHASE",)
+"""Kinds of material and phase function that few scenes have: what others compile does not name them."""
+
+
 def record_text(name: str, dtype: np.dtype[Any]) -> str:
     """C struct of a record dtype."""
     lines = []
@@ -66,13 +70,22 @@ def kinds_text(family: str) -> str:
     In units of these only: macros that occur in a unit decide what is built again.
     """
     names = tuple(BSDF_FACTS) if family == "BSDF" else ENUMS[family]
-    parts = [f"#define {family}_KINDS ({' + '.join(f'CLVOL_{family}_{name}' for name in names)})"]
+    usual, rare = ([n for n in names if (n in RARE) is which] for which in (False, True))
+    parts = [f"#define {family}_KINDS ({_kinds(family, usual)})"]
+    if rare:
+        any_rare = " || ".join(f"CLVOL_{family}_{name}" for name in rare)
+        every = f"#define {family}_KINDS ({_kinds(family, names)})"
+        parts = [f"#if {any_rare}", every, "#else", *parts, "#endif"]
     if family == "BSDF":
         smooth = (name for name, facts in BSDF_FACTS.items() if facts.smooth)
         transmits = (name for name, facts in BSDF_FACTS.items() if facts.transmits)
         parts += [f"#define IS_SMOOTH(material) {_any_of(smooth)}"]
         parts += [f"#define IS_TRANSMISSIVE(material) {_any_of(transmits)}"]
     return "\n".join(parts) + "\n"
+
+
+def _kinds(family: str, names: Iterable[str]) -> str:
+    return " + ".join(f"CLVOL_{family}_{name}" for name in names)
 
 
 def _any_of(names: Iterable[str]) -> str:

@@ -97,8 +97,12 @@ class Features:
 
     @property
     def peaked(self) -> bool:
-        """Some phase function has a peak, and some light is found by next-event estimation alone."""
-        return "HG" in self.phases and (self.directional or self.point_lights or self.spot)
+        """Some phase function has a peak, and some light is found by next-event estimation alone.
+
+        All have to have a convolution in closed form, which tables lack (cl/phase/convolution.h).
+        """
+        closed = "HG" in self.phases and "TABPHASE" not in self.phases
+        return closed and (self.directional or self.point_lights or self.spot)
 
     @property
     def near_lights(self) -> bool:

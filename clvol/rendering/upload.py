@@ -23,7 +23,8 @@ from clvol.tables.blackbody import blackbody_table
 from clvol.tables.light_cache import light_cache_record, rows
 from clvol.tables.lights import LightTable, envmap_arrays, light_table
 from clvol.tables.materials import material_table
-from clvol.tables.media import medium_table, phase_table
+from clvol.tables.media import medium_table
+from clvol.tables.phases import phase_table
 from clvol.tables.pixel_filter import filter_cdf
 from clvol.tables.sobol import block_table
 from clvol.tables.transfers import transfer_tables

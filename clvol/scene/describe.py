@@ -12,6 +12,7 @@ import numpy as np
 from clvol.base.memory import format_bytes
 from clvol.scene import records
 from clvol.scene.materials import Bsdf, Dielectric, Mask, Null, TwoSided
+from clvol.scene.tabulated import mean_cosine
 from clvol.scene.vocabulary import listed
 from clvol.volumes import GridInfo, read_volume
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
@@ -222,6 +223,9 @@ def _phase(phase: records.PhaseFunction) -> str:
     if isinstance(phase, records.BlendPhase):
         share = _number(phase.weight)
         return f"blend ({_phase(phase.first)}, and {share} of it {_phase(phase.second)})"
+    if phase.table is not None:
+        mean = _number(round(mean_cosine(phase.table), 4))
+        return f"{phase.kind} ({len(phase.table.values)} values, mean cosine {mean})"
     return phase.kind + (f" (g {_number(phase.g)})" if phase.kind == "hg" else "")
 
 

@@ -20,6 +20,7 @@ from clvol.scene import (
     phase,
     sensor,
     shape,
+    tabulated,
     texture,
     volume,
 )
@@ -99,6 +100,7 @@ PLUGINS: PluginTable = {
         "hg": phase.hg,
         "rayleigh": phase.rayleigh,
         "blendphase": phase.blendphase,
+        "tabphase": tabulated.tabphase,
     },
     "emitter": {
         "constant": emitter.constant,

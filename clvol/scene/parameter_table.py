@@ -211,6 +211,10 @@ def _phase(medium: Any, phase: records.PhaseFunction, put: Put, path: tuple[str,
     elif phase.kind == "hg":
         check = values.number(-1, 1, exclusive=True)
         yield "g", Parameter(medium, phase.g, check, lambda m, v: inner(m, g=v))
+    elif phase.table is not None:
+        check = values.phase_values(phase.table)
+        shown = values.shown_values
+        yield "values", Parameter(medium, phase.table, check, lambda m, v: inner(m, table=v), shown)
 
 
 _BSDF_NUMBERS = {"alpha", "alpha_u", "alpha_v"}

@@ -18,6 +18,7 @@ from clvol.scene.medium_facts import channels_of
 from clvol.scene.reader import BRIGHTEST, ROUNDING, range_in_words
 from clvol.scene.sensor import film_fault, is_rigid
 from clvol.scene.shape import stays_round
+from clvol.scene.tabulated import table_fault
 from clvol.scene.texture import check_texels
 from clvol.scene.transforms import as_matrix, check_size, keeps_angles, scale, translate
 from clvol.scene.volume import largest_value
@@ -100,6 +101,23 @@ def points(maximum: float, grey: bool) -> Check:
         return transfer
 
     return check
+
+
+def phase_values(table: records.PhaseTable) -> Check:
+    """The values of a phase function's table, whose angles stay."""
+
+    def check(value: Any, name: str) -> records.PhaseTable:
+        changed = replace(table, values=tuple(_numbers(value).reshape(-1).tolist()))
+        if fault := table_fault(changed):
+            raise SceneError(f"{fault[1]} of a tabphase", name)
+        return changed
+
+    return check
+
+
+def shown_values(table: records.PhaseTable) -> np.ndarray:
+    """The values of a phase function's table as users see them."""
+    return frozen(np.array(table.values))
 
 
 def kelvin() -> Check:

@@ -168,11 +168,24 @@ Volume = ConstVolume | GridVolume
 
 
 @dataclass(frozen=True)
+class PhaseTable:
+    """Values of a phase function, up to a factor, between which it is linear in the cosine.
+
+    values : of the cosines -1 (back) to 1 (straight on) in even steps, or of `angles`.
+    angles : increasing, in degrees, from 0 (straight on) to 180; empty: even steps of the cosine.
+    """
+
+    values: tuple[float, ...]
+    angles: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
 class Phase:
-    """Phase function: "isotropic", "rayleigh", or "hg" (Henyey–Greenstein) with mean cosine g."""
+    """Phase function: "isotropic", "rayleigh", "hg" (Henyey–Greenstein) with mean cosine g, or "tabphase"."""
 
     kind: str = "isotropic"
     g: float = 0.0
+    table: PhaseTable | None = None  # of a tabphase
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ LATER: dict[str, tuple[str, ...]] = {
         *("ellipsoids", "heightfield"),
     ),
     "bsdf": ("principled", "bumpmap", "normalmap", "blendbsdf"),
-    "phase": ("sggx", "tabphase"),
+    "phase": ("sggx",),
     "emitter": ("projector", "directionalarea", "sunsky"),
     "texture": ("mesh_attribute", "volume", "uniform", "srgb", "d65", "blackbody"),
 }

@@ -8,7 +8,7 @@ import numpy as np
 
 from clvol import layout
 from clvol.scene import records
-from clvol.scene.boundaries import MediumEntry, entry_bounds, is_clipped
+from clvol.scene.boundaries import entry_bounds, is_clipped
 from clvol.scene.medium_facts import bounding_kind, is_homogeneous
 from clvol.scene.phase import phase_lobes
 from clvol.scene.thinness import thin_media
@@ -89,16 +89,6 @@ def _clip_to(record: np.void, box: tuple[np.ndarray, np.ndarray], centre: np.nda
     record["clipped"] = 1
     record["box_from_world"] = np.eye(4)[:3].reshape(12)
     record["box_lower"], record["box_upper"] = box[0] - centre - slack, box[1] - centre + slack
-
-
-def phase_table(entries: tuple[MediumEntry, ...]) -> np.ndarray:
-    """One PHASE record per lobe of each medium, in the order that `phase_first` counts in."""
-    lobes = [
-        (layout.enum("PHASE", p.kind), p.g, share)
-        for e in entries
-        for p, share in phase_lobes(e.medium.phase)
-    ]
-    return np.array(lobes, layout.PHASE)
 
 
 def mean_incident_radiance(scene: records.Scene) -> tuple[np.ndarray, np.ndarray]:

@@ -225,6 +225,7 @@ PARAMETERS = {
     "isotropic": ({}, {}),
     "hg": ({}, {"g": 0.3}),
     "rayleigh": ({}, {}),
+    "tabphase": ({"values": "1, 2, 3"}, {"values": "1, 2, 4", "angles": "0, 40, 180"}),
     "blendphase": (
         {"weight": 0.5, "a": {"type": "isotropic"}, "b": {"type": "rayleigh"}},
         {"weight": 0.2, "a": {"type": "hg"}, "b": {"type": "hg"}},

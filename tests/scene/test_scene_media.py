@@ -13,7 +13,7 @@ from clvol.scene.describe import describe_scene
 from clvol.scene.digest import scene_digest
 from clvol.scene.medium_facts import medium_volumes
 from clvol.scene.phase import MAX_LOBES
-from clvol.scene.records import BlendPhase, ConstVolume, Film, GridVolume, Medium, Phase
+from clvol.scene.records import BlendPhase, ConstVolume, Film, GridVolume, Medium, Phase, PhaseTable
 from clvol.volumes.transfer import Transfer, Transfers
 
 DENSITY = np.random.default_rng(3).uniform(0, 2, (4, 3, 2))
@@ -261,6 +261,16 @@ BLEND = {
 }
 
 
+TABLE = {"type": "tabphase", "values": "1, 2.5 4"}
+
+
+def test_a_tabulated_phase_function_is_a_string_or_an_array():
+    assert medium_of(phase=TABLE).phase.table == PhaseTable((1.0, 2.5, 4.0))
+    given = TABLE | {"values": np.float32([1, 2.5, 4]), "angles": [0, 90, 180]}
+    assert medium_of(phase=given).phase.table == PhaseTable((1.0, 2.5, 4.0), (0.0, 90.0, 180.0))
+    assert features_of(phase=TABLE).phases == ("TABPHASE",)
+
+
 def test_rayleigh_and_blended_phase_functions():
     assert medium_of(phase={"type": "rayleigh"}).phase == Phase("rayleigh")
     blend = BlendPhase(0.25, Phase("hg", 0.5), Phase("rayleigh"))
@@ -309,7 +319,18 @@ def test_mixtures_cannot_grow_without_end():
     [
         ({"type": "hg", "g": 1.0}, "must be in (-1, 1)"),
         ({"type": "rayleigh", "g": 0.5}, "unknown parameter 'g' of phase 'rayleigh'"),
-        ({"type": "tabphase"}, "phase 'tabphase' is not supported in this version; supported: isotropic"),
+        ({"type": "sggx"}, "phase 'sggx' is not supported in this version; supported: isotropic"),
+        ({"type": "tabphase"}, "a tabphase needs values"),
+        (TABLE | {"values": "1"}, "phase.values: there must be 2 to 65536 values, not 1, of a tabphase"),
+        (TABLE | {"values": "1, x2"}, "'values' of a tabphase has 'x2', which is no number"),
+        (TABLE | {"values": "0, 0"}, "values must be finite and >= 0, and not all 0"),
+        (TABLE | {"values": "1 nan"}, "values must be finite and >= 0"),
+        (TABLE | {"values": [[1, 2]]}, "must be numbers in a row"),
+        (TABLE | {"values": 3}, "must be numbers in a row"),
+        (TABLE | {"values": {"type": "rgb", "value": [1, 2, 3]}}, "must be an array of numbers"),
+        (TABLE | {"angles": "0, 180"}, "phase.angles: there must be as many angles as values, 3, not 2, of"),
+        (TABLE | {"angles": "0, 90, 90"}, "angles must increase from 0 to 180"),
+        (TABLE | {"values": "1, 0, 0", "angles": "0, 1e-6, 180"}, "a peak that is too narrow"),
         (
             BLEND | {"weight": 1.5},
             "scene.cube.interior.phase.weight: 'weight' of phase 'blendphase' must be in [0, 1]",
