@@ -13,6 +13,7 @@ from clvol.picture.formats import component_of, is_linear
 
 if TYPE_CHECKING:
     from clvol.picture.estimate import Estimate, Ranges
+    from clvol.picture.scenery import Scenery
     from clvol.picture.view_transform import View
 
 RECORD = "clvol:result"
@@ -33,6 +34,7 @@ class Pictured(Protocol):
     component_format: str | None
     denoised: np.ndarray | None
     files: tuple[str, ...]
+    scenery: Scenery | None
 
     @property
     def alpha(self) -> np.ndarray | None:
@@ -80,6 +82,7 @@ def _record(result: Pictured, component: str) -> str:
         "sums": kept_sums.described(result.estimate, component == "float16"),
         "component_format": result.component_format,
         "files": result.files,
+        "scenery": result.scenery and result.scenery.described(),
     }
     return json.dumps(said, default=_plain)
 

@@ -16,6 +16,7 @@ from clvol.picture import kept_sums
 from clvol.picture.encoding import RECORD
 from clvol.picture.image_io import ALPHA, DENOISED
 from clvol.picture.result import Result
+from clvol.picture.scenery import Scenery
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -105,6 +106,7 @@ def _result(said: Any, layers: dict[str, np.ndarray]) -> Result:
     count = _whole(said["samples"])
     result = Result(image, variance, stats, layers, metadata, (ranges[0][0], count), estimate, ranges)
     result.component_format, result.denoised = said.get("component_format"), denoised
+    result.scenery = Scenery.read(said.get("scenery"))
     result.files = tuple(map(str, said.get("files", ())))
     return result
 

@@ -87,6 +87,7 @@ def merge(results: Iterable[Result]) -> Result:
         metadata=_merged_metadata([result.metadata for result in results], sum(counts)),
     )
     merged.ranges, merged.component_format = ranges, results[0].component_format
+    merged.scenery = results[0].scenery
     merged.files = tuple(dict.fromkeys(file for result in results for file in result.files))
     merged.metadata |= said_ranges(ranges)
     return merged

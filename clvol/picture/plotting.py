@@ -25,6 +25,8 @@ AROUND, LETTERS = "#262626", "#f4f4f4"
 """Behind what lies outside of the picture, and of letters."""
 TICK = 0.02
 """Length of a tick, as a share of the picture's shorter side."""
+GAP = 3
+"""Dots that are free round letters."""
 SCALE_BAR = 0.22
 """Share of the picture's width that a scale bar of no given length has at most."""
 
@@ -63,7 +65,7 @@ def plot(
     reach = [np.array([[0.0, 0.0], [width, height]])]
     if scenery is not None:
         if box:
-            _draw_box(place, scenery)
+            reach.append(_draw_box(place, scenery))
         if axes:
             for side in range(3):
                 reach.append(_draw_axis(place, scenery, side, size))
@@ -72,13 +74,50 @@ def plot(
         if has_bar and scenery.transfers is not None:
             _draw_colours(figure, scenery.transfers)
     low, high = np.min([r.min(axis=0) for r in reach], axis=0), np.max([r.max(axis=0) for r in reach], axis=0)
-    place.set(xlim=(low[0], high[0]), ylim=(high[1], low[1]))
-    _lay_out(figure, high - low, size)
+    most = np.array([[-1.0, -1.0], [1.0, 1.0]]) * size + np.array([[0.0, 0.0], [width, height]])
+    for _ in range(2):  # letters keep their size when there is more to show
+        low, high = np.maximum(low, most[0]), np.minimum(high, most[1])
+        _lay_out(figure, low, high, size)
+        low, high = _with_letters(place, low, high)
+    _declutter(place)
     return figure
 
 
-def _lay_out(figure: Any, extent: np.ndarray, size: int) -> None:
-    """The picture as large as it is, or larger where letters would be too large for it; the bar beside it."""
+def _with_letters(place: Any, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Corners in pixels of the picture of what all letters fit into, too."""
+    ends = [place.transData.inverted().transform(box.get_points()) for box in map(_extent, place.texts)]
+    margin = GAP * (high - low) / place.figure.bbox.size
+    every = np.concatenate(
+        [[low, high], *(np.sort(end, axis=0) + np.array([-margin, margin]) for end in ends)]
+    )
+    return every.min(axis=0), every.max(axis=0)
+
+
+def _extent(text: Any) -> Any:
+    """The box round letters, in dots of the figure."""
+    return text.get_window_extent(text.figure.canvas.get_renderer())
+
+
+def _declutter(place: Any) -> None:
+    """Hide letters that are cut or lie over others; names of axes come first, then numbers in their order."""
+    kept: list[Any] = []
+    frame = place.get_window_extent().padded(1)
+    for text in sorted(place.texts, key=lambda text: -text.get_fontsize()):
+        box = _extent(text).padded(GAP)
+        whole = frame.contains(*box.min) and frame.contains(*box.max)
+        if not whole or any(box.overlaps(other) for other in kept):
+            text.set_visible(False)
+        else:
+            kept.append(box)
+
+
+def _lay_out(figure: Any, low: np.ndarray, high: np.ndarray, size: int) -> None:
+    """The picture as large as it is, or larger where letters would be too large for it; the bar beside it.
+
+    low, high : corners of what is shown, in pixels of the picture.
+    """
+    figure.axes[0].set(xlim=(low[0], high[0]), ylim=(high[1], low[1]))
+    extent = high - low
     inches = extent * max(1 / DOTS_PER_INCH, LEAST_INCHES / size)
     bar = BAR_INCHES if len(figure.axes) > 1 else 0.0
     whole = float(inches[0]) + bar
@@ -94,8 +133,11 @@ def _stroke(width: float) -> list[Any]:
     return [patheffects.withStroke(linewidth=width, foreground=EDGE, alpha=0.75)]
 
 
-def _draw_box(place: Any, scenery: Scenery) -> None:
-    """The twelve sides; those behind the volume are dashed."""
+def _draw_box(place: Any, scenery: Scenery) -> np.ndarray:
+    """The twelve sides; those behind the volume are dashed.
+
+    Returns the pixels (n, 2) that they reach to.
+    """
     shares = np.array(list(product((0.0, 1.0), repeat=3)))
     corners = scenery.corner + shares @ scenery.edges
     farthest = int(scenery.place(corners)[2].argmax())
@@ -105,6 +147,8 @@ def _draw_box(place: Any, scenery: Scenery) -> None:
         place.plot(
             *pixels[[one, other]].T, **style, path_effects=None if farthest in (one, other) else _stroke(2.2)
         )
+    seen: np.ndarray = pixels[np.isfinite(pixels).all(axis=1)]
+    return seen if len(seen) else np.zeros((1, 2))
 
 
 def _draw_axis(place: Any, scenery: Scenery, side: int, size: int) -> np.ndarray:
@@ -156,7 +200,7 @@ def _draw_axis(place: Any, scenery: Scenery, side: int, size: int) -> np.ndarray
         place.plot(*np.stack([at, at + tick * out]).T, **LINE, path_effects=_stroke(2.2))
         place.text(*(at + 2.4 * tick * out), f"{value:.6g}", **letters)
     unit = f" ({scenery.unit})" if scenery.unit else ""
-    place.text(*(ends[chosen].mean(axis=0) + 5.2 * tick * out), f"{name}{unit}", **letters | {"fontsize": 10})
+    place.text(*(ends[chosen].mean(axis=0) + 6.2 * tick * out), f"{name}{unit}", **letters | {"fontsize": 10})
     border: np.ndarray = ends[chosen] + 4.2 * tick * out
     return np.concatenate([border, border.mean(axis=0, keepdims=True) + 3.0 * tick * out])
 
@@ -216,6 +260,6 @@ def _draw_colours(figure: Any, transfers: Transfers) -> None:
     place.yaxis.tick_right()
     place.tick_params(labelsize=8, colors=LETTERS)
     place.set_title("value", fontsize=9, color=LETTERS)
-    place.set_xlabel("opacity", fontsize=8, color=LETTERS)
+    place.set_xlabel("opacity", fontsize=8, color=LETTERS, labelpad=8)
     for spine in place.spines.values():
         spine.set_color(LETTERS)

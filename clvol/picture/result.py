@@ -215,8 +215,7 @@ class Result:
         Raises
         ------
         OptionError
-            There is nothing to label: the result was read from a file, or its scene has not one volume; or
-            matplotlib is missing.
+            There is nothing to label, as its scene has not one volume; or matplotlib is missing.
         """
         from clvol.picture.plotting import plot
 

@@ -25,12 +25,15 @@ def scenery_of(prepared: PreparedScene) -> Scenery | None:
     assert isinstance(volume, GridVolume)
     rays = camera_rays(prepared.scene.sensor, prepared.scene.film, np.zeros(3), np.inf)
     linear, offset = volume.index_to_world[:3, :3], volume.index_to_world[:3, 3]
+    start, columns = rays.frame
     right = rays.dx if rays.parallel else rays.base_dx
     return Scenery(
-        rays.place,
+        start,
+        np.linalg.inv(columns),
         right / np.linalg.norm(right),
         linear @ volume.lower + offset,
         (linear * (volume.upper - volume.lower)).T,
         volume.grid.unit if isinstance(volume.grid, DenseGrid) else "",
         medium.transfers,
+        rays.parallel,
     )

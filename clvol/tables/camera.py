@@ -52,11 +52,17 @@ class CameraRays:
     lens_bend: float
     parallel: bool = False
 
+    @property
+    def frame(self) -> tuple[np.ndarray, np.ndarray]:
+        """Where rays start, and the columns (3, 3) that take a pixel (x, y, 1) to what is seen there."""
+        if self.parallel:
+            return self.position, np.column_stack((self.dx, self.dy, self.base))
+        return self.eye, np.column_stack((self.base_dx, self.base_dy, self.base))
+
     def place(self, points: np.ndarray) -> np.ndarray:
         """Where points (n, 3) are seen: x, y, and the parameter along the ray, > 0 in front; (3, n)."""
-        along = (self.dx, self.dy, self.base) if self.parallel else (self.base_dx, self.base_dy, self.base)
-        start = self.position if self.parallel else self.eye
-        a, b, depth = np.linalg.solve(np.column_stack(along), (points - start).T)
+        start, columns = self.frame
+        a, b, depth = np.linalg.solve(columns, (points - start).T)
         with np.errstate(divide="ignore", invalid="ignore"):
             seen = (a, b) if self.parallel else (a / depth, b / depth)
         return np.stack([*seen, depth])

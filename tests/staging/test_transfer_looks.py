@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 import clvol
+from clvol.picture.scenery import Scenery
 from clvol.scene.records import GridVolume
 from clvol.staging.presets import PRESETS
 from clvol.volumes.grid import DenseGrid
@@ -163,11 +165,45 @@ def test_labels_that_cannot_be_are_refused(shown: clvol.Result, tmp_path: Path) 
     for wrong in (-1, 1e6, "long", float("nan")):
         with pytest.raises(clvol.OptionError):
             shown.plot(scale_bar=wrong)  # type: ignore[arg-type]
+    bare = replace(shown, scenery=None)
+    with pytest.raises(clvol.OptionError, match="knows no volume"):
+        bare.plot()
+    assert bare.plot(axes=False, box=False) is not None
+
+
+def test_a_picture_from_a_file_has_its_labels(shown: clvol.Result, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed")
     shown.save(tmp_path / "a.exr")
     again = clvol.load_result(tmp_path / "a.exr")
-    with pytest.raises(clvol.OptionError, match="knows no volume"):
-        again.plot()
-    assert again.plot(axes=False, box=False) is not None
+    for one in (again, clvol.merge([again])):
+        assert one.scenery is not None and shown.scenery is not None
+        assert one.scenery.described() == shown.scenery.described()
+        words = [[t.get_text() for t in r.plot(scale_bar=20).axes[0].texts] for r in (one, shown)]
+        assert words[0] == words[1]
+    for wrong in (
+        {"start": [0, 0]},
+        {"rows": "x"},
+        {"corner": [0, 0, float("inf")]},
+        {"transfers": {"a": "b"}},
+    ):
+        with pytest.raises((KeyError, TypeError, ValueError)):
+            Scenery.read(shown.scenery.described() | wrong)
+
+
+@pytest.mark.parametrize("size", [(40, 32), (64, 20), (20, 64)])
+def test_letters_are_whole_and_lie_apart(size: tuple[int, int]) -> None:
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+    result = clvol.render(clvol.volume_scene(placed(), transfer="bone", size=size), spp=1)
+    figure = result.plot(scale_bar=True)
+    place, renderer = figure.axes[0], figure.canvas.get_renderer()
+    boxes = [t.get_window_extent(renderer) for t in place.texts if t.get_visible()]
+    assert len(boxes) > 4
+    assert not any(one.overlaps(two) for n, one in enumerate(boxes) for two in boxes[:n])
+    for box in [*boxes, figure.axes[1].get_tightbbox(renderer)]:
+        assert box.x0 >= -2 and box.y0 >= -2
+        assert box.x1 <= figure.bbox.x1 + 2 and box.y1 <= figure.bbox.y1 + 2
+    near = clvol.render(clvol.volume_scene(placed(), size=size, distance=0.3), spp=1).plot()
+    assert max(near.get_size_inches()) < 4 * max(figure.get_size_inches())
 
 
 def test_the_lines_of_the_documentation_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
