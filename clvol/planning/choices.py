@@ -81,7 +81,8 @@ class Choices:
         own = scene.integrator.choices
         given = {f: names.get(f, "auto") for f in registry.FAMILIES}
         asked: dict[str, Any] = {f: own.get(f, "auto") if n == "auto" else n for f, n in given.items()}
-        return cls(**asked, **numbers)
+        aov = (*scene.integrator.aovs, *_aovs(numbers.get("aov", ())))
+        return cls(**asked, **(numbers | {"aov": aov}))
 
 
 def _aovs(names: str | Iterable[str]) -> tuple[str, ...]:

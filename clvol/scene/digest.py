@@ -14,7 +14,7 @@ take seconds."""
 
 _APART = (
     *("source", "files", "name", "spp", "seed", "choices", "sensors", "component_format", "kept"),
-    *("approximated", "left_out"),  # the records tell
+    *("approximated", "left_out", "aovs"),  # the records tell
     *("sanitize", "repairs"),  # the samples tell
 )
 """Fields that do not tell scenes apart."""

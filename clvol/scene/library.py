@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from clvol.errors import SceneError
 from clvol.scene.faults import Faults, LostError, UnsupportedError
 from clvol.scene.nodes import Node
-from clvol.scene.vocabulary import LATER, did_you_mean, join_hints, listed
+from clvol.scene.vocabulary import INSTEAD, LATER, did_you_mean, join_hints, listed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -129,5 +129,6 @@ class Library:
             return
         what, guess = f"unknown {kind} '{node.type}'", did_you_mean(node.type, supported)
         if node.type in LATER.get(kind, ()):
-            what, guess = f"{kind} '{node.type}' is not supported in this version", ""
+            what = f"{kind} '{node.type}' is not supported in this version"
+            guess = f"{INSTEAD[node.type]};" if node.type in INSTEAD else ""
         raise UnsupportedError(what, node.where, join_hints(guess, f"supported: {listed(supported)}"))

@@ -42,6 +42,9 @@ PLUGINS: PluginTable = {
         "volpathmis": integrator.volpath,
         "path": integrator.path,
         "moment": integrator.moment,
+        "aov": integrator.aov,
+        **dict.fromkeys(integrator.OTHERS, integrator.other),
+        **dict.fromkeys(integrator.WRAPPERS, integrator.wrapper),
     },
     "sensor": {
         "perspective": sensor.perspective,
@@ -361,7 +364,7 @@ def _integrator(integrators: list[tuple[Node, integrator.Chosen]], with_media: s
         raise SceneError("a scene takes one integrator, this is the second", integrators[1][0].where)
     node, chosen = integrators[0]
     if with_media and not chosen.media:
-        raise SceneError(
+        raise UnsupportedError(
             f"integrator '{chosen.name}' sees no media, and the scene has some ({with_media})",
             node.where,
             "use volpath",

@@ -358,6 +358,7 @@ class Integrator:
     rr_depth: int = 5
     hide_emitters: bool = False
     choices: dict[str, str] = field(default_factory=dict)
+    aovs: tuple[str, ...] = ()  # pictures that are made beside the image, whoever asks
 
 
 @dataclass(frozen=True)

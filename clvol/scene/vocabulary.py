@@ -9,13 +9,13 @@ import heapq
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
-from clvol.errors import shortened
+from clvol.errors import option, shortened
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
 LATER: dict[str, tuple[str, ...]] = {
-    "integrator": ("direct", "aov", "depth", "ptracer"),
+    "integrator": ("depth", "stokes", "volprim_rf_basic", "multichannel", "vrl", "vpl", "ao"),
     "sensor": ("radiancemeter", "irradiancemeter", "distant", "batch"),
     "film": ("specfilm",),
     "shape": (
@@ -28,6 +28,12 @@ LATER: dict[str, tuple[str, ...]] = {
     "texture": ("mesh_attribute", "volume", "uniform", "srgb", "d65", "blackbody"),
 }
 """Kind -> plugins known by name and not supported in this version."""
+
+INSTEAD = {
+    "depth": f"the layer {option('aov', 'depth')} of a picture has it",
+    "stokes": "light is not polarized here",
+}
+"""Plugins that are not supported, and what to do about that."""
 
 VITAL = ("sigma_t", "values", "albedo", "emission", "temperature")
 """Parameters that a plugin is lost with, where they are given and cannot be read: it would be another."""

@@ -7,6 +7,8 @@ values are accepted and change no expected image.  The files named here are writ
 import numpy as np
 
 from clvol.scene import rotate, translate
+from clvol.scene.integrator import OTHERS, WRAPPERS
+from clvol.scene.sensor import OTHER_SAMPLERS
 
 RGB = {"type": "rgb", "value": [0.1, 0.2, 0.3]}
 TEXELS = np.linspace(0, 1, 12, dtype=np.float32).reshape(2, 2, 3)
@@ -98,13 +100,31 @@ MEDIUM = {
     "temperature_scale": 2.0,
     "temperature_offset": -1.0,
 }
+SAMPLER = {"sample_count": 9, "seed": 9}
+INNER = {"inner": {"type": "path"}}, {"inner": {"type": "volpath", "max_depth": 2}}
+
+
+def silent(types):
+    """What is ignored, with a value of its type."""
+    return {name: Silent({bool: True, int: 3, float: 0.5, str: "a"}[kind]) for name, kind in types.items()}
+
+
+def limits(other):
+    """What integrators have that ours serve."""
+    fixed = ("max_depth", "rr_depth") if other.fixed else ()
+    return {name: value for name, value in LIMITS.items() if name not in fixed} | silent(other.ignored)
+
+
 UV = np.diag([2.0, 3.0, 1.0])
 
 PARAMETERS = {
     "volpath": ({}, LIMITS | CHOICES),
     "volpathmis": ({}, LIMITS | CHOICES),
     "path": ({}, LIMITS),
-    "moment": ({"inner": {"type": "path"}}, {"inner": {"type": "volpath", "max_depth": 2}}),
+    "moment": INNER,
+    "aov": (INNER[0], INNER[1] | {"aovs": Silent("d:depth")}),
+    **{name: (INNER[0], INNER[1] | silent(types)) for name, types in WRAPPERS.items()},
+    **{name: ({}, limits(other)) for name, other in OTHERS.items()},
     "perspective": (
         {"fov": 40.0},
         CAMERA
@@ -142,14 +162,8 @@ PARAMETERS = {
     "mitchell": ({}, {"B": 0.2, "C": 0.2}),
     "catmullrom": ({}, {}),
     "lanczos": ({}, {"lobes": 2}),
-    "independent": ({}, {"sample_count": 9, "seed": 9}),
-    "stratified": ({}, {"sample_count": 9, "seed": 9, "jitter": Silent(False)}),
-    "multijitter": ({}, {"sample_count": 9, "seed": 9, "jitter": Silent(False)}),
-    "orthogonal": ({}, {"sample_count": 9, "seed": 9, "strength": Silent(2), "jitter": Silent(False)}),
-    "ldsampler": ({}, {"sample_count": 9, "seed": 9, "dimension": Silent(4)}),
-    "halton": ({}, {"sample_count": 9, "seed": 9, "scramble": Silent(-1)}),
-    "hammersley": ({}, {"sample_count": 9, "seed": 9, "scramble": Silent(-1)}),
-    "sobol": ({}, {"sample_count": 9, "seed": 9, "scramble": Silent(-1)}),
+    "independent": ({}, SAMPLER),
+    **{name: ({}, SAMPLER | silent(types)) for name, types in OTHER_SAMPLERS.items()},
     "cube": ({}, SHAPE | {"face_normals": Silent(True)}),
     "sphere": ({}, SHAPE | {"center": [1, 2, 3], "radius": 2.0}),
     "rectangle": ({}, SHAPE | {"face_normals": Silent(True)}),

@@ -91,7 +91,7 @@ def scene_of(plugin):
     if kind in ("volume", "phase"):
         medium[{"volume": "sigma_t"}.get(kind, kind)] = plugin
     fog = {"type": "cube", "bsdf": {"type": "null"}, "interior": plugin if kind == "medium" else medium}
-    without_media = plugin["type"] in ("path", "moment")
+    without_media = kind == "integrator" and not plugin["type"].startswith("vol")
     return {"type": "scene", "sensor": sensor, "wall": wall} | light | ({} if without_media else {"fog": fog})
 
 

@@ -5,6 +5,8 @@ import logging
 import pytest
 
 import clvol
+from clvol.scene.integrator import OTHERS, WRAPPERS
+from clvol.scene.records import Integrator
 from clvol.scene.sensor import OTHER_SAMPLERS
 
 
@@ -29,3 +31,55 @@ def test_what_is_taken_for_something_else_is_said_once_and_in_the_metadata(caplo
     assert [record.getMessage() for record in caplog.records] == [f"scene.camera.sampler: {said}"]
     assert scene.approximated == (said,)
     assert clvol.render(scene, spp=1).metadata["approximated"] == said
+
+
+def integrator_of(**integrator):
+    return clvol.load_dict(scene_with() | {"it": integrator}).integrator
+
+
+@pytest.mark.parametrize("name", sorted(OTHERS))
+def test_other_integrators_are_path_tracers_of_the_same_limits(name):
+    """Mitsuba's with derivatives end after six interactions unless they are told otherwise."""
+    default = {
+        "prb": 6,
+        "prb_basic": 6,
+        "prb_projective": 6,
+        "prbvolpath": 6,
+        "direct": 2,
+        "direct_projective": 2,
+    }
+    assert integrator_of(type=name).max_depth == default.get(name, -1)
+    if not OTHERS[name].fixed:
+        assert integrator_of(type=name, max_depth=9, rr_depth=3) == Integrator(9, 3)
+
+
+def test_wrappers_are_what_is_inside():
+    inside = {"type": "volpath", "max_depth": 7}
+    for name in WRAPPERS:
+        assert integrator_of(type=name, it=inside) == Integrator(7)
+    with pytest.raises(clvol.SceneError, match="this one is empty"):
+        integrator_of(type="adaptive")
+
+
+def test_aovs_of_a_scene_are_layers_of_its_pictures():
+    given = scene_with() | {"it": {"type": "aov", "aovs": "d:depth, n:sh_normal", "a": {"type": "path"}}}
+    scene = clvol.load_dict(given)
+    assert scene.integrator.aovs == ("depth", "normal")
+    assert {"depth", "normal", "cells"} < clvol.render(scene, spp=1, aov=["cells"]).aovs.keys()
+    with pytest.raises(
+        clvol.SceneError, match="aov 'u:uv' is not supported; write name:type, with types albedo"
+    ):
+        integrator_of(type="aov", aovs="d:depth,u:uv")
+
+
+def test_a_depth_integrator_is_refused_with_what_to_do():
+    with pytest.raises(clvol.SceneError, match=r"the layer aov=.depth. of a picture has it; supported"):
+        integrator_of(type="depth")
+
+
+def test_integrators_that_see_no_media_are_refused_where_there_are_some():
+    medium = {"type": "cube", "bsdf": {"type": "null"}, "interior": {"type": "homogeneous"}}
+    for name in ("path", "prb", "direct"):
+        with pytest.raises(clvol.SceneError, match=f"'{name}' sees no media"):
+            clvol.load_dict(scene_with() | {"it": {"type": name}, "fog": medium})
+    clvol.load_dict(scene_with() | {"it": {"type": "prbvolpath"}, "fog": medium})
