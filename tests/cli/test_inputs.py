@@ -37,6 +37,7 @@ VIEW = """<scene version="3.0.0">
   </sensor>
 </scene>"""
 OBJ = "v -2 -2 -2\nv 2 -2 -2\nv 0 -2 2\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
+COMPARED = "--techniques", "delta,regular", "-o", "report"
 FILES = {"scene.xml", "view.xml", "sky.exr", "floor.obj", "wood.exr", "fog.vol"}
 
 
@@ -84,7 +85,7 @@ def test_files_that_other_files_name_are_known_too(folder: Path) -> None:
         ("render", "scene.xml", "-o", "a.png", "-o", "wood.exr"),
         ("render", "scene.xml", "-o", "a.png", "--trace", "link.json"),
         ("ray", "scene.xml", "2", "2", "-o", "link.json"),
-        ("compare", "scene.xml", "-D", "sky=report/reference.exr", "-o", "report"),
+        ("compare", "scene.xml", "-D", "sky=report/reference.exr", *COMPARED),
     ],
 )
 def test_commands_replace_no_file_of_the_scene(
