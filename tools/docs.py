@@ -48,10 +48,14 @@ PROFILE = "<!-- profile: written by tools/docs.py -->", "<!-- end of profile -->
 TRANSITIONS = "<!-- transitions: written by tools/docs.py -->", "<!-- end of transitions -->"
 
 
+def pages() -> str:
+    """What stands in them."""
+    return "\n".join((DOCS / page).read_text(encoding="utf-8") for page in PICTURED)
+
+
 def commands() -> dict[str, list[str]]:
     """The commands of docs/ that make its pictures and films, by their names."""
-    text = "\n".join((DOCS / page).read_text(encoding="utf-8") for page in PICTURED)
-    found = {}
+    text, found = pages(), {}
     for line in re.findall(r"clvol (?:render|ray) scenes/[^`\n]+", text):
         words = shlex.split(line)
         for output in (words[n + 1] for n, word in enumerate(words[:-1]) if word == "-o"):
@@ -74,11 +78,11 @@ def without(words: list[str], *options: str) -> list[str]:
 def run(words: list[str], name: str) -> None:
     """One of these commands, with its output in docs/pictures.
 
-    A picture that is denoised is there twice: NAME-denoised.png is what the command writes, NAME.png what it
-    writes without --denoise; the samples are the same.
+    A denoised picture is there twice where a page shows NAME-denoised.png: that is what the command writes,
+    and NAME.png what it writes without --denoise, of the same samples.
     """
     output = Path("docs/pictures") / Path(words[words.index("-o") + 1]).name
-    if "--denoise" not in words or output.suffix != ".png":
+    if "--denoise" not in words or f"pictures/{name}-denoised.png" not in pages():
         call([*without(words[1:], "-o"), "-o", str(output)])
         return
     with tempfile.TemporaryDirectory() as folder:

@@ -7,9 +7,11 @@ is there.
 from __future__ import annotations
 
 import re
+import sys
 import tomllib
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from places import ROOT, SCENES
@@ -17,6 +19,10 @@ from places import ROOT, SCENES
 import clvol
 from clvol.planning.registry import AOVS, FAMILIES, option
 from clvol.scene.loader import PLUGINS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import ModuleType
 
 DOCS = ROOT / "docs"
 PAGES = sorted([*DOCS.glob("*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md"])
@@ -148,3 +154,26 @@ def test_every_scene_and_the_command_of_every_picture_stand_in_the_gallery() -> 
         name = Path(picture).stem.removesuffix("-denoised")
         made = re.search(rf"`clvol render scenes/{name}.xml -o {name}.png [^`]+`", gallery)
         assert made or f'.save("{name}.png"' in gallery
+
+
+def test_denoised_pictures_are_there_twice_where_a_page_shows_both(
+    tool: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delitem(sys.modules, "docs", raising=False)
+    docs = tool("docs")
+    asked: list[list[str]] = []
+
+    class Called(Exception):  # noqa: N818
+        """What is asked of clvol is all that is wanted."""
+
+    def call(words: list[str]) -> None:
+        asked.append(words)
+        raise Called
+
+    monkeypatch.setattr(docs, "call", call)
+    for name in ("column", "shaft"):
+        with pytest.raises(Called):
+            docs.run(docs.commands()[name], name)
+    assert all("--denoise" in words for words in asked)
+    assert asked[0][-1] == "docs/pictures/column.png"
+    assert asked[1][-1].endswith(".exr")
