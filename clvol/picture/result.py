@@ -15,6 +15,7 @@ import numpy as np
 
 from clvol.base.extras import need
 from clvol.base.output_files import check_spares
+from clvol.base.progress import format_noise
 from clvol.errors import OptionError
 from clvol.picture import denoising, image_io
 from clvol.picture.dither import codes
@@ -142,7 +143,7 @@ class Result:
         how = [str(self.metadata[key]) for key in keys if key in self.metadata]
         (first, _), spp = self.ranges[0], self.samples[1]
         extent = f"{spp} spp from sample {first} on" if first else f"{spp} spp"
-        about = f"{width} x {height}, {extent}, noise {self.noise:.2%}"
+        about = f"{width} x {height}, {extent}, noise {format_noise(self.noise)}"
         return f"<{type(self).__name__} {', '.join([about, *how])}>"
 
     @property

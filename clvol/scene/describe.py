@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.base.memory import format_bytes
+from clvol.errors import VolumeError
 from clvol.scene import records
 from clvol.scene.materials import Bsdf, Dielectric, Mask, Null, TwoSided
 from clvol.scene.tabulated import mean_cosine
 from clvol.scene.vocabulary import listed
 from clvol.volumes import GridInfo, read_volume
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
-from clvol.volumes.listing import box_of
+from clvol.volumes.listing import box_of, list_grids
 from clvol.volumes.read import SPARSE, list_sparse, read_sparse
 
 if TYPE_CHECKING:
@@ -29,10 +30,21 @@ MOST_FILES = 20
 def describe_volume(path: str, grid: str | None = None) -> list[str]:
     """Every grid of a volume file, or the one named; VolumeError where the file cannot be read."""
     if grid is not None or Path(path).suffix.lower() not in SPARSE:
+        names = [] if grid is not None else [listed.name for listed in list_grids(path)]
+        if len(names) > 1:
+            return [line for name in names for line in _named_lines(path, name)]
         return describe_grid(read_volume(path, grid))
     stored = list_sparse(path)
     lines = [line for number, info in enumerate(stored) for line in _stored_lines(path, number, info)]
     return lines or [f"{path}: it has no grids"]
+
+
+def _named_lines(path: str, name: str) -> Iterator[str]:
+    """One of several arrays of a file; what cannot be a volume says why."""
+    try:
+        yield from describe_grid(read_volume(path, name))
+    except VolumeError as error:
+        yield f"{name}: cannot be rendered, {error.what}"
 
 
 def _stored_lines(path: str, number: int, stored: GridInfo) -> Iterator[str]:

@@ -164,3 +164,12 @@ def test_options_that_do_not_fit_the_file_are_refused():
 def test_describe_volume_reads_each_grid_once_by_its_place():
     lines = describe_volume(str(FILES / "same_name.vdb"))
     assert sum(line.startswith("density") for line in lines) == 2
+
+
+def test_every_array_of_a_file_is_described(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, smoke=np.ones((2, 3, 4)), heat=np.full((2, 3, 4), 7.0), mask=np.ones((2, 2)))
+    lines = describe_volume(str(path))
+    assert [line.split(":")[0] for line in lines if not line.startswith(" ")] == ["smoke", "heat", "mask"]
+    assert "mask: cannot be rendered, an array of 2 axes" in lines[-1]
+    assert describe_volume(str(path), "heat")[0].startswith("heat: dense, 4 x 3 x 2")
