@@ -69,11 +69,12 @@ class EnoughError(Exception):
 
 
 class Faults:
-    """Of one scene: `errors`, and what was `left_out` instead, if that is asked for."""
+    """Of one scene: `errors`, what was `left_out` instead if that is asked for, what is `approximated`."""
 
     def __init__(self) -> None:
         self.errors: list[Error] = []
         self.left_out: dict[str, None] = {}  # in order
+        self.approximated: dict[str, None] = {}  # what is taken as something else, and as what, in order
         self.lost_ids: set[str] = set()  # of plugins that could not be read
         self.lost_file = False  # whether an included file, with whatever ids, could not be read
         self.skips = _skips.get()
@@ -81,6 +82,12 @@ class Faults:
     def __bool__(self) -> bool:
         """Whether there is anything that is not there because of a fault."""
         return bool(self.errors or self.left_out)
+
+    def approximate(self, said: str, where: str) -> None:
+        """Say that something is taken as something else: once in the log, with the first one's place."""
+        if said not in self.approximated:
+            self.approximated[said] = None
+            log.warning("%s: %s", where, said)
 
     def note(self, error: Error) -> None:
         """Go on without what the error is about.

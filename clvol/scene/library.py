@@ -48,7 +48,6 @@ class Library:
         self.taken: set[int] = set()  # id() of every plugin that another one holds or refers to
         self.built: dict[int, Any] = {}  # records, by id() of their node; None where there is none
         self.open: list[Node] = []  # what is being built, the outermost first
-        self.approximated: list[str] = []  # what is taken as something else, and as what, each once
         self._ids: dict[str, Node] = {}
         self._collect_ids(root)
         for alias, (target, where) in root.aliases.items():

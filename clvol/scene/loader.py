@@ -278,7 +278,7 @@ def _build(root: Node, source: str, grids: Grids | None, faults: Faults) -> Scen
         seed=sensors[0].sampler.seed,
         source=source,
         sensors=sensors,
-        approximated=tuple(library.approximated),
+        approximated=tuple(faults.approximated),
         left_out=tuple(faults.left_out),
     )
 

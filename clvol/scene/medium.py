@@ -31,15 +31,12 @@ def heterogeneous(reader: Reader) -> Medium:
 
 
 def _medium(reader: Reader, homogeneous: bool) -> Medium:
-    for name in ("sigma_s", "sigma_a"):
-        if name in reader.node:
-            reader.fail(
-                f"a medium has no '{name}'",
-                name,
-                "give sigma_t, which is sigma_a + sigma_s, and albedo, which is sigma_s / sigma_t",
-            )
-    sigma_t, scale = _extinction(reader, homogeneous)
-    albedo = _coefficient(reader, "albedo", 0.75, maximum=1.0)
+    if reader.has("sigma_s") or reader.has("sigma_a"):
+        sigma_t, albedo = _by_parts(reader)
+        scale = reader.color("scale", 1.0)
+    else:
+        sigma_t, scale = _extinction(reader, homogeneous)
+        albedo = _coefficient(reader, "albedo", 0.75, maximum=1.0)
     emission = _emission(reader)
     return Medium(sigma_t, albedo, scale, homogeneous=homogeneous, **emission, **common_parameters(reader))
 
@@ -73,6 +70,20 @@ def _extinction(reader: Reader, homogeneous: bool) -> tuple[Volume, Spectrum]:
         )
     sigma_t, factors = _reduced(reader, sigma_t)
     return sigma_t, tuple(scale[0] * factor for factor in factors)
+
+
+def _by_parts(reader: Reader) -> tuple[Volume, Volume]:
+    """sigma_t and albedo from `sigma_s` and `sigma_a`, as Mitsuba's media before version 2 have them."""
+    for name, other in (("sigma_s", "sigma_a"), ("sigma_a", "sigma_s")):
+        if not reader.has(name):
+            reader.fail(f"a medium with '{other}' needs '{name}' too", other)
+    for name in ("sigma_t", "albedo"):
+        if reader.has(name):
+            reader.fail(f"give either sigma_t and albedo, or sigma_s and sigma_a, not '{name}' too", name)
+    parts = [np.array(reader.color(name, 0.0)) for name in ("sigma_s", "sigma_a")]
+    total = parts[0] + parts[1]
+    albedo = np.divide(parts[0], total, out=np.zeros_like(total), where=total > 0)
+    return ConstVolume(tuple(total.tolist())), ConstVolume(tuple(albedo.tolist()))
 
 
 def _reduced(reader: Reader, volume: GridVolume) -> tuple[GridVolume, Spectrum]:

@@ -286,10 +286,7 @@ class Reader:
         Once for all alike in the log, with the first one's place, and in the metadata of pictures.
         """
         taken = f"'{name}' of {self.kind} '{self.type}'" if name else f"{self.kind} '{self.type}'"
-        said = f"{taken} is taken as {as_what}"
-        if said not in self.library.approximated:
-            self.library.approximated.append(said)
-            log.warning("%s: %s", self.place(name), said)
+        self.library.faults.approximate(f"{taken} is taken as {as_what}", self.place(name))
 
     def ignore(self, **names: type) -> None:
         """Accept parameters of these types (bool, int, float, str): they do not change the expected image."""

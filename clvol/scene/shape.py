@@ -14,7 +14,7 @@ from clvol.scene.material_facts import has_textures
 from clvol.scene.materials import Diffuse
 from clvol.scene.mesh_files import read_mesh
 from clvol.scene.records import Medium, Mesh, Shape
-from clvol.scene.transforms import check_size, keeps_angles, scale, translate
+from clvol.scene.transforms import check_size, frame, keeps_angles, scale, translate
 
 if TYPE_CHECKING:
     from clvol.scene.reader import Reader
@@ -63,7 +63,7 @@ def cylinder(reader: Reader) -> Shape:
     length = float(np.linalg.norm(last - first))
     if length == 0:
         reader.fail("p0 and p1 are the same point", "p1" if reader.has("p1") else "p0")
-    matrix = reader.transform() @ translate(first) @ _frame((last - first) / length)
+    matrix = reader.transform() @ translate(first) @ frame((last - first) / length)
     shape = _shape(reader, "cylinder", matrix @ scale([radius, radius, length]))
     if shape.emission and not stays_round(matrix):
         reader.fail(
@@ -98,21 +98,6 @@ def mesh(reader: Reader) -> Shape:
         name = f" of shape '{reader.node.id}'" if reader.node.id else ""
         reader.fail(f"mesh '{path}'{name}: {error}", "filename")
     return _shape(reader, "mesh", reader.transform() @ translate(origin), read)
-
-
-def _frame(z: np.ndarray) -> np.ndarray:
-    """Rotation that turns local +z onto the unit vector `z` (Duff et al. 2017).
-
-    u = 0 lies where Mitsuba's cylinders have it.
-    """
-    sign = np.copysign(1.0, z[2])
-    a = -1 / (sign + z[2])
-    b = z[0] * z[1] * a
-    matrix = np.eye(4)
-    matrix[:3, 0] = 1 + sign * z[0] ** 2 * a, sign * b, -sign * z[0]
-    matrix[:3, 1] = b, sign + z[1] ** 2 * a, -z[1]
-    matrix[:3, 2] = z
-    return matrix
 
 
 def _shape(reader: Reader, kind: str, to_world: np.ndarray, triangles: Mesh | None = None) -> Shape:

@@ -137,6 +137,29 @@ def look_at(origin: ArrayLike, target: ArrayLike, up: ArrayLike) -> np.ndarray:
     return matrix
 
 
+def frame(z: np.ndarray) -> np.ndarray:
+    """Rotation that turns local +z onto the unit vector `z`, 4x4 (Duff et al. 2017).
+
+    The other axes lie where Mitsuba's `coordinate_system` has them.
+    """
+    sign = np.copysign(1.0, z[2])
+    a = -1 / (sign + z[2])
+    b = z[0] * z[1] * a
+    matrix = np.eye(4)
+    matrix[:3, 0] = 1 + sign * z[0] ** 2 * a, sign * b, -sign * z[0]
+    matrix[:3, 1] = b, sign + z[1] ** 2 * a, -z[1]
+    matrix[:3, 2] = z
+    return matrix
+
+
+def any_up(origin: ArrayLike, target: ArrayLike) -> np.ndarray:
+    """The `up` of a view that names none, as Mitsuba takes it, float64 (3,)."""
+    ahead = _vector(target, "look_at: target") - _vector(origin, "look_at: origin")
+    length = np.linalg.norm(ahead)
+    up: np.ndarray = frame(ahead / length)[:3, 0] if length > 0 else np.array([0.0, 1.0, 0.0])
+    return up
+
+
 def as_matrix(value: Any) -> np.ndarray:
     """`value` (4x4 array, or an object with a 4x4 ``.matrix``) as an invertible, affine float64 matrix.
 

@@ -20,6 +20,7 @@ from clvol.scene import transforms
 from clvol.scene.faults import Faults, UnsupportedError
 from clvol.scene.files import find
 from clvol.scene.nodes import NAMELESS, Node
+from clvol.scene.upgrade import upgraded
 from clvol.scene.vocabulary import did_you_mean, join_hints, listed
 from clvol.scene.xml_tree import Element, parse_elements, parse_text
 from clvol.scene.xml_values import (
@@ -157,9 +158,11 @@ class _XmlReader:
             fail(element, f"unknown element <{element.tag}>", "a scene file begins with <scene>")
         attributes = self.attributes(element, "type", "id", "name", "version")
         version = attributes.get("version", "")
-        if not re.fullmatch(r"[23]\.\d+(\.\d+)?", version, re.ASCII):
+        if not re.fullmatch(r"[0-3]\.\d+(\.\d+)?", version, re.ASCII):
             what = f"version '{version}' is not supported" if version else "the version is missing"
-            fail(element, what, _version_hint(element.tag, version))
+            fail(element, what, f'for Mitsuba 2 and 3, write <{element.tag} version="3.0.0">')
+        if version[0] in "01":
+            element = upgraded(element, self.faults)
         return self.plugin(element, folders)
 
     def include(self, element: Element, parent: Node) -> None:
@@ -314,6 +317,8 @@ class _XmlReader:
             return name, text.lower() == "true"
         if tag == "string":
             return name, text
+        if tag == "spectrum" and element.old and ":" not in text:
+            tag = "rgb"  # which such lists of numbers were
         node = Node(element.where)
         node.add("type", tag, element.where)
         node.add(
@@ -349,10 +354,10 @@ class _XmlReader:
                 parse_xyz(element, attributes, 0.0), parse_float(element, attributes["angle"])
             )
         if tag == "lookat":
-            attributes = self.attributes(element, "!origin", "!target", "!up")
-            return transforms.look_at(
-                *(parse_floats(element, attributes[name], (3,)) for name in ("origin", "target", "up"))
-            )
+            attributes = self.attributes(element, "!origin", "!target", "up")
+            origin, target = (parse_floats(element, attributes[name], (3,)) for name in ("origin", "target"))
+            up = parse_floats(element, attributes["up"], (3,)) if attributes.get("up") else None
+            return transforms.look_at(origin, target, transforms.any_up(origin, target) if up is None else up)
         if tag == "matrix":
             numbers = parse_floats(element, self.attributes(element, "!value")["value"], (9, 16))
             matrix = np.eye(4)
@@ -382,12 +387,6 @@ def _ids_in(element: Element) -> Iterator[str]:
 def _no_children(element: Element) -> None:
     if element.children:
         fail(element.children[0], f"<{element.children[0].tag}> cannot be inside <{element.tag}>")
-
-
-def _version_hint(tag: str, version: str) -> str:
-    if re.match(r"[01]\.", version):
-        return f'write its names as Mitsuba 3 has them (sigmaT is sigma_t), and <{tag} version="3.0.0">'
-    return f'for Mitsuba 2 and 3, write <{tag} version="3.0.0">'
 
 
 def _only_inside(tag: str) -> str:

@@ -16,12 +16,13 @@ if TYPE_CHECKING:
 
 @dataclass
 class Element:
-    """One XML element; `where` is "file:line"."""
+    """One XML element; `where` is "file:line".  `old`: of a scene of Mitsuba before version 2."""
 
     tag: str
     attributes: dict[str, str]
     where: str
     children: list[Element] = field(default_factory=list)
+    old: bool = False
 
 
 def parse_elements(path: Path) -> Element:

@@ -278,7 +278,7 @@ def test_what_cannot_be_understood_is_an_error(load, elements, message):
         ('<!DOCTYPE s [<!ENTITY a "x">]><scene version="3.0.0"/>', "entity 'a' is refused"),
         ('<!DOCTYPE s SYSTEM "file:///etc/passwd"><scene version="3.0.0"/>', "external document type"),
         ('<!DOCTYPE s [<!ENTITY % a SYSTEM "file:///x"> %a;]><scene version="3.0.0"/>', "refused"),
-        ('<scene version="0.6.0"/>', "version '0.6.0' is not supported"),
+        ('<scene version="4.0.0"/>', "version '4.0.0' is not supported"),
         ("<scene/>", "the version is missing"),
         ('<shape type="cube" version="3.0.0"/>', "the root element must be <scene>"),
         ('<scene version="3.0.0"/>', "the scene has no sensor"),

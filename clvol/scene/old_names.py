@@ -1,0 +1,100 @@
+"""What scenes of Mitsuba before version 2 call otherwise than later ones: the data of `clvol.scene.upgrade`.
+
+Mitsuba 3's own upgrader turns camelCase into snake_case, renames `diffuse_reflectance` and makes `to_uv` of `UV`.
+The rest is what scenes of that time need beside.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+TAGS = {"lookAt": "lookat", "camera": "sensor", "luminaire": "emitter", "srgb": "rgb"}
+"""Elements by their names then."""
+
+NULL_IN_MEDIA = "null"
+"""BSDF of a shape that has a medium and no BSDF: light passes.  From version 2 on such a shape is diffuse."""
+
+ON_ALL: dict[str, tuple[str, ...]] = {
+    "shape": ("collapse", "max_smooth_angle", "shape_triangles", "load_materials", "srgb"),
+    "sensor": ("shutter_open", "shutter_close"),
+    "film": (
+        *("attach_log", "high_quality_edges", "file_format", "banner", "filename", "digits", "variable"),
+        *("gamma", "exposure", "tonemap_method", "key", "burn", "label_0", "metadata_0"),
+    ),
+    "texture": ("max_anisotropy", "cache", "gamma"),
+    "integrator": ("strict_normals",),
+    "emitter": ("sampling_weight",),
+}
+"""By kind of plugin: parameters that change no expected picture, or only how it is shown."""
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What becomes of a plugin.
+
+    to : its type.  renamed : its parameters' names.  dropped : parameters that change no expected picture.
+    values : what a parameter's value is called now, in lower case.  added : (element, name, value) that say
+        what was the default.  said : what it is taken as, where that is something else.
+    """
+
+    to: str = ""
+    renamed: Mapping[str, str] = field(default_factory=dict)
+    dropped: tuple[str, ...] = ()
+    values: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    added: tuple[tuple[str, str, str], ...] = ()
+    said: str = ""
+
+
+_FILM = Rule(
+    values={
+        "pixel_format": dict.fromkeys(("luminance", "spectrum", "xyz", "spectrumalpha"), "rgb")
+        | dict.fromkeys(("luminancealpha", "xyza"), "rgba"),
+        "component_format": {"uint32": "float32"},
+    }
+)
+_BITMAP = Rule(values={"filter_type": {"ewa": "bilinear", "trilinear": "bilinear", "isotropic": "bilinear"}})
+_PIXELS = "hdrfilm: pictures are linear, and shown as the command line says"
+
+RULES: dict[tuple[str, str], Rule] = {
+    ("film", "hdrfilm"): _FILM,
+    ("film", "exrfilm"): Rule("hdrfilm", values=_FILM.values),
+    ("film", "tiledhdrfilm"): Rule("hdrfilm", values=_FILM.values),
+    ("film", "ldrfilm"): Rule("hdrfilm", values=_FILM.values, said=_PIXELS),
+    ("film", "pngfilm"): Rule("hdrfilm", values=_FILM.values, said=_PIXELS),
+    ("film", "mfilm"): Rule("hdrfilm", values=_FILM.values, said="hdrfilm, which writes no matrices"),
+    ("rfilter", "box"): Rule(dropped=("radius",)),
+    ("rfilter", "sinc"): Rule("lanczos"),
+    ("sensor", "perspective"): Rule(dropped=("aperture_radius",)),
+    ("bsdf", "diffuse"): Rule(renamed={"diffuse_reflectance": "reflectance"}),
+    ("bsdf", "lambertian"): Rule("diffuse", renamed={"diffuse_reflectance": "reflectance"}),
+    ("bsdf", "mirror"): Rule("conductor", added=(("string", "material", "none"),)),
+    ("texture", "bitmap"): _BITMAP,
+    ("texture", "ldrtexture"): Rule("bitmap", values=_BITMAP.values),
+    ("texture", "exrtexture"): Rule("bitmap", values=_BITMAP.values),
+    ("texture", "checkerboard"): Rule(renamed={"bright_color": "color0", "dark_color": "color1"}),
+    ("medium", "homogeneous"): Rule(dropped=("strategy", "sampling_weight", "medium_sampling_weight")),
+    ("medium", "heterogeneous"): Rule(
+        renamed={"density": "sigma_t", "density_multiplier": "scale"}, dropped=("method", "step_size")
+    ),
+    ("volume", "gridvolume"): Rule(dropped=("send_data",), added=(("boolean", "use_grid_bbox", "true"),)),
+    ("volume", "constvolume"): Rule(renamed={"color": "value"}),
+    ("emitter", "point"): Rule(renamed={"power": "intensity"}),
+    ("emitter", "envmap"): Rule(renamed={"intensity_scale": "scale"}, dropped=("cache",)),
+    ("emitter", "constant"): Rule(renamed={"intensity": "radiance"}),
+    ("emitter", "area"): Rule(renamed={"intensity": "radiance"}),
+    ("emitter", "directional"): Rule(renamed={"intensity": "irradiance"}),
+    ("integrator", "vrl"): Rule(
+        "volpath",
+        dropped=("light_emissions", "use_light_cut", "short_vrls"),
+        said="volpath, which has the same expectation",
+    ),
+    ("integrator", "volpathsimple"): Rule("volpath_simple"),
+}
+"""By element and type of a plugin; those without a rule are as they were."""
+
+UV = ("uoffset", "voffset", "uscale", "vscale")
+"""Parameters of textures that are a `to_uv` now."""

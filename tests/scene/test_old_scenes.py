@@ -1,0 +1,149 @@
+"""Scenes of Mitsuba 0.3 to 1 mean what they meant: read as version 3 has it in other words."""
+
+import numpy as np
+import pytest
+
+import clvol
+from clvol.scene import look_at, scale, translate
+from clvol.scene.digest import scene_digest
+from clvol.scene.materials import Diffuse, Null
+from clvol.scene.upgrade import snake_case
+from clvol.volumes import write_vol
+
+SENSOR = '<sensor type="perspective"/>'
+
+
+def old(*elements, version="0.5.0", sensor=SENSOR):
+    return clvol.load_string(f'<scene version="{version}">{sensor}{"".join(elements)}</scene>')
+
+
+def new(*elements, sensor=SENSOR):
+    return clvol.load_string(f'<scene version="3.0.0">{sensor}{"".join(elements)}</scene>')
+
+
+def same(one, other):
+    return (scene_digest(one), one.spp) == (scene_digest(other), other.spp)
+
+
+@pytest.mark.parametrize(
+    ("given", "wanted"),
+    [
+        ("toWorld", "to_world"),
+        ("intIOR", "int_ior"),
+        ("sigmaT", "sigma_t"),
+        ("uoffset", "uoffset"),
+        ("B", "B"),
+    ],
+)
+def test_names_are_upgraded_as_mitsuba_upgrades_them(given, wanted):
+    assert snake_case(given) == wanted
+
+
+def test_a_whole_old_scene_is_a_new_one():
+    before = old(
+        """<integrator type="volpath_simple"><integer name="maxDepth" value="8"/>
+            <integer name="rrDepth" value="9"/><boolean name="strictNormals" value="true"/></integrator>
+        <medium id="milk" type="homogeneous"><spectrum name="sigmaS" value="1, 2, 3"/>
+            <spectrum name="sigmaA" value="1"/><float name="scale" value="4"/></medium>
+        <shape type="cube"><transform name="toWorld"><scale value="2"/></transform>
+            <ref name="interior" id="milk"/></shape>
+        <shape type="sphere"><bsdf type="diffuse"><srgb name="diffuseReflectance" value="#ff8000"/></bsdf></shape>
+        <emitter type="point"><spectrum name="intensity" value="5" intent="illuminant"/></emitter>""",
+        sensor="""<sensor type="perspective"><float name="fov" value="45"/><string name="fovAxis" value="x"/>
+            <transform name="toWorld"><lookAt target="0, 0, 0" origin="0  0  9"/></transform>
+            <sampler type="ldsampler"><integer name="sampleCount" value="16"/></sampler>
+            <film type="ldrfilm"><integer name="width" value="9"/><integer name="height" value="8"/>
+            <boolean name="banner" value="false"/><float name="gamma" value="2.2"/>
+            <string name="pixelFormat" value="luminance"/></film></sensor>""",
+    )
+    after = new(
+        """<integrator type="volpath"><integer name="max_depth" value="8"/>
+            <integer name="rr_depth" value="9"/></integrator>
+        <medium id="milk" type="homogeneous"><rgb name="sigma_t" value="2, 3, 4"/>
+            <rgb name="albedo" value="0.5, 0.6666666666666666, 0.75"/><float name="scale" value="4"/></medium>
+        <shape type="cube"><transform name="to_world"><scale value="2"/></transform>
+            <ref name="interior" id="milk"/><bsdf type="null"/></shape>
+        <shape type="sphere"><bsdf type="diffuse"><rgb name="reflectance" value="1, 0.21586050011389926, 0"/></bsdf>
+        </shape>
+        <emitter type="point"><rgb name="intensity" value="5"/></emitter>""",
+        sensor="""<sensor type="perspective"><float name="fov" value="45"/>
+            <transform name="to_world"><lookat target="0, 0, 0" origin="0,0,9" up="1, 0, 0"/></transform>
+            <sampler type="independent"><integer name="sample_count" value="16"/></sampler>
+            <film type="hdrfilm"><integer name="width" value="9"/><integer name="height" value="8"/>
+            </film></sensor>""",
+    )
+    assert same(before, after)
+    assert len(before.approximated) == 3  # the integrator, the sampler and the film
+
+
+def test_a_view_without_up_is_mitsubas():
+    """Its matrix is what Mitsuba 3.9.1 prints."""
+    view = '<sensor type="perspective"><transform name="to_world"><lookat origin="0,0,20" target="0,0,0"/>'
+    matrix = new(sensor=f"{view}</transform></sensor>").sensor.to_world
+    assert np.array_equal(matrix, [[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 20], [0, 0, 0, 1]])
+    assert np.array_equal(matrix, look_at([0, 0, 20], [0, 0, 0], [1, 0, 0]))
+
+
+def test_old_grids_lie_in_the_box_of_their_file(tmp_path):
+    write_vol(tmp_path / "a.vol", np.ones((2, 2, 2), np.float32), box=((1, 2, 3), (3, 4, 6)))
+    parts = f'<string name="filename" value="{tmp_path}/a.vol"/><boolean name="sendData" value="true"/>'
+    medium = '<shape type="cube"><medium name="interior" type="heterogeneous"><string name="method" \
+value="woodcock"/><float name="stepSize" value="1"/><volume name="density" type="gridvolume">{}</volume></medium></shape>'
+    found = old(medium.format(parts)).shapes[0]
+    assert isinstance(found.bsdf, Null)
+    corners = found.interior.sigma_t.index_to_world @ [[-0.5, 1.5], [-0.5, 1.5], [-0.5, 1.5], [1, 1]]
+    assert np.allclose(corners[:3].T, [(1, 2, 3), (3, 4, 6)])
+    box = '<point name="min" x="0" y="0" z="1"/><point name="max" x="2" y="2" z="2"/>'
+    moved = f'{box}<transform name="toWorld"><translate x="5"/></transform>'
+    placed = old(medium.format(parts + moved)).shapes[0].interior.sigma_t.index_to_world
+    assert np.allclose(placed, translate([5, 0, 1]) @ scale([2, 2, 1]) @ scale(0.5) @ translate(0.5))
+
+
+def test_only_old_shapes_with_a_medium_and_no_bsdf_let_light_pass():
+    shape = '<shape type="cube"><medium name="interior" type="homogeneous"/></shape>'
+    assert isinstance(old(shape).shapes[0].bsdf, Null)
+    assert isinstance(new(shape).shapes[0].bsdf, Diffuse)
+    assert isinstance(old('<shape type="cube"/>').shapes[0].bsdf, Diffuse)
+
+
+def test_offsets_and_scales_of_textures_are_their_to_uv():
+    parts = '<float name="uoffset" value="0.5"/><float name="vscale" value="3"/>'
+    wall = (
+        '<shape type="cube"><bsdf type="diffuse"><texture name="reflectance" type="checkerboard">{}</texture>\
+</bsdf></shape>'
+    )
+    steps = '<transform name="to_uv"><translate x="0.5"/><scale y="3"/></transform>'
+    assert same(old(wall.format(parts)), new(wall.format(steps)))
+
+
+def test_versions_from_2_on_are_not_upgraded():
+    shape = '<shape type="cube"><transform name="toWorld"/></shape>'
+    with pytest.raises(
+        clvol.SceneError, match="unknown parameter 'toWorld' of shape 'cube'; did you mean 'to_world'"
+    ):
+        clvol.load_string(f'<scene version="2.0.0">{SENSOR}{shape}</scene>')
+    old(shape, version="1.2.3")
+
+
+def test_old_names_that_nobody_knows_are_faults_of_their_lines():
+    text = f'<scene version="0.6.0">{SENSOR}\n<shape type="cube"><float name="maxDepht" value="1"/></shape>\n\
+<texture type="scale"><animation/></texture></scene>'
+    with pytest.raises(clvol.SceneError) as caught:
+        clvol.load_string(text)
+    assert "the text:2: unknown parameter 'max_depht' of shape 'cube'" in str(caught.value)
+    assert "the text:3: unknown element <animation>" in str(caught.value)
+
+
+def test_media_take_scattering_and_absorption_together():
+    medium = '<shape type="cube"><medium name="interior" type="homogeneous">{}</medium></shape>'
+    s, a = '<float name="sigma_s" value="3"/>', '<float name="sigma_a" value="1"/>'
+    found = new(medium.format(s + a)).shapes[0].interior
+    assert (found.sigma_t.value, found.albedo.value) == ((4.0,), (0.75,))
+    none = new(medium.format(s.replace("3", "0") + a.replace("1", "0"))).shapes[0].interior
+    assert (none.sigma_t.value, none.albedo.value) == ((0.0,), (0.0,))
+    for parts, told in (
+        (s, "needs 'sigma_a' too"),
+        (s + a + '<float name="albedo" value="1"/>', "either sigma_t"),
+    ):
+        with pytest.raises(clvol.SceneError, match=told):
+            new(medium.format(parts))
