@@ -1,7 +1,7 @@
 """What scenes of Mitsuba before version 2 call otherwise than later ones: the data of `clvol.scene.upgrade`.
 
-Mitsuba 3's own upgrader turns camelCase into snake_case, renames `diffuse_reflectance` and makes `to_uv` of `UV`.
-The rest is what scenes of that time need beside.
+Mitsuba 3's own upgrader turns camelCase into snake_case, renames `diffuse_reflectance`, and makes
+`to_uv` of `UV`. The rest is what scenes of that time need beside.
 """
 
 from __future__ import annotations

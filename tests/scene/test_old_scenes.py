@@ -47,7 +47,8 @@ def test_a_whole_old_scene_is_a_new_one():
             <spectrum name="sigmaA" value="1"/><float name="scale" value="4"/></medium>
         <shape type="cube"><transform name="toWorld"><scale value="2"/></transform>
             <ref name="interior" id="milk"/></shape>
-        <shape type="sphere"><bsdf type="diffuse"><srgb name="diffuseReflectance" value="#ff8000"/></bsdf></shape>
+        <shape type="sphere"><bsdf type="diffuse"><srgb name="diffuseReflectance" value="#ff8000"/></bsdf>
+        </shape>
         <emitter type="point"><spectrum name="intensity" value="5" intent="illuminant"/></emitter>""",
         sensor="""<sensor type="perspective"><float name="fov" value="45"/><string name="fovAxis" value="x"/>
             <transform name="toWorld"><lookAt target="0, 0, 0" origin="0  0  9"/></transform>
@@ -63,8 +64,8 @@ def test_a_whole_old_scene_is_a_new_one():
             <rgb name="albedo" value="0.5, 0.6666666666666666, 0.75"/><float name="scale" value="4"/></medium>
         <shape type="cube"><transform name="to_world"><scale value="2"/></transform>
             <ref name="interior" id="milk"/><bsdf type="null"/></shape>
-        <shape type="sphere"><bsdf type="diffuse"><rgb name="reflectance" value="1, 0.21586050011389926, 0"/></bsdf>
-        </shape>
+        <shape type="sphere"><bsdf type="diffuse">
+            <rgb name="reflectance" value="1, 0.21586050011389926, 0"/></bsdf></shape>
         <emitter type="point"><rgb name="intensity" value="5"/></emitter>""",
         sensor="""<sensor type="perspective"><float name="fov" value="45"/>
             <transform name="to_world"><lookat target="0, 0, 0" origin="0,0,9" up="1, 0, 0"/></transform>
@@ -88,7 +89,8 @@ def test_old_grids_lie_in_the_box_of_their_file(tmp_path):
     write_vol(tmp_path / "a.vol", np.ones((2, 2, 2), np.float32), box=((1, 2, 3), (3, 4, 6)))
     parts = f'<string name="filename" value="{tmp_path}/a.vol"/><boolean name="sendData" value="true"/>'
     medium = '<shape type="cube"><medium name="interior" type="heterogeneous"><string name="method" \
-value="woodcock"/><float name="stepSize" value="1"/><volume name="density" type="gridvolume">{}</volume></medium></shape>'
+value="woodcock"/><float name="stepSize" value="1"/>\
+<volume name="density" type="gridvolume">{}</volume></medium></shape>'
     found = old(medium.format(parts)).shapes[0]
     assert isinstance(found.bsdf, Null)
     corners = found.interior.sigma_t.index_to_world @ [[-0.5, 1.5], [-0.5, 1.5], [-0.5, 1.5], [1, 1]]
@@ -108,10 +110,8 @@ def test_only_old_shapes_with_a_medium_and_no_bsdf_let_light_pass():
 
 def test_offsets_and_scales_of_textures_are_their_to_uv():
     parts = '<float name="uoffset" value="0.5"/><float name="vscale" value="3"/>'
-    wall = (
-        '<shape type="cube"><bsdf type="diffuse"><texture name="reflectance" type="checkerboard">{}</texture>\
-</bsdf></shape>'
-    )
+    wall = '<shape type="cube"><bsdf type="diffuse">\
+<texture name="reflectance" type="checkerboard">{}</texture></bsdf></shape>'
     steps = '<transform name="to_uv"><translate x="0.5"/><scale y="3"/></transform>'
     assert same(old(wall.format(parts)), new(wall.format(steps)))
 
