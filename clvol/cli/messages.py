@@ -33,7 +33,7 @@ class OneLineErrors(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """As `click.Group` does, and refuse options that are given twice and take one value."""
         name, command, rest = super().resolve_command(ctx, args)
-        if command is not None:
+        if command is not None and not ctx.resilient_parsing:
             check_once(command, click.Context(command, info_name=name, parent=ctx), rest)
         return name, command, rest
 

@@ -25,6 +25,8 @@ AROUND, LETTERS = "#262626", "#f4f4f4"
 """Behind what lies outside of the picture, and of letters."""
 TICK = 0.02
 """Length of a tick, as a share of the picture's shorter side."""
+MOST_TICKS = 20
+"""Along an axis, however large it is in the picture."""
 GAP = 3
 """Dots that are free round letters."""
 SCALE_BAR = 0.22
@@ -73,7 +75,7 @@ def plot(
             _draw_scale_bar(place, scenery, scale_bar, width, height)
         if has_bar and scenery.transfers is not None:
             _draw_colours(figure, scenery.transfers)
-    low, high = np.min([r.min(axis=0) for r in reach], axis=0), np.max([r.max(axis=0) for r in reach], axis=0)
+    low, high = _corners(reach)
     most = np.array([[-1.0, -1.0], [1.0, 1.0]]) * size + np.array([[0.0, 0.0], [width, height]])
     for _ in range(2):  # letters keep their size when there is more to show
         low, high = np.maximum(low, most[0]), np.minimum(high, most[1])
@@ -87,9 +89,14 @@ def _with_letters(place: Any, low: np.ndarray, high: np.ndarray) -> tuple[np.nda
     """Corners in pixels of the picture of what all letters fit into, too."""
     ends = [place.transData.inverted().transform(box.get_points()) for box in map(_extent, place.texts)]
     margin = GAP * (high - low) / place.figure.bbox.size
-    every = np.concatenate(
-        [[low, high], *(np.sort(end, axis=0) + np.array([-margin, margin]) for end in ends)]
-    )
+    wider = (np.sort(end, axis=0) + np.array([-margin, margin]) for end in ends)
+    return _corners([np.stack([low, high]), *wider])
+
+
+def _corners(points: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """The least and the greatest of points (n, 2), but for those that are not in the picture's plane."""
+    every = np.concatenate(points)
+    every = every[np.isfinite(every).all(axis=1)]
     return every.min(axis=0), every.max(axis=0)
 
 
@@ -186,7 +193,7 @@ def _draw_axis(place: Any, scenery: Scenery, side: int, size: int) -> np.ndarray
     start, tick = scenery.corner_at(starts[chosen]), TICK * size
     length = float(np.linalg.norm(ends[chosen][1] - ends[chosen][0]))
     low, high = min(first, last), max(first, last)
-    locator = MaxNLocator(nbins=max(int(length / size * 7), 1), steps=[1, 2, 5, 10])
+    locator = MaxNLocator(nbins=int(np.clip(length / size * 7, 1, MOST_TICKS)), steps=[1, 2, 5, 10])
     values = np.asarray(locator.tick_values(low, high))
     letters = {
         "color": LETTERS,

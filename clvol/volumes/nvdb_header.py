@@ -24,6 +24,7 @@ HEADER = struct.Struct("<8sIHH")
 METADATA = struct.Struct("<4Q2I6d6i3dI4I3I2HI")
 GRID_BYTES, TREE_BYTES = 672, 64
 LONGEST_NAME = 1 << 16
+MOST_TOGETHER = 1 << 12
 
 TYPES = [
     "unknown",
@@ -187,6 +188,8 @@ def _packed_together(whole: GridBytes, name: str) -> list[tuple[str, int]]:
     count, size = struct.unpack_from("<I", header, 28)[0], struct.unpack_from("<Q", header, 32)[0]
     if header[:8] not in (MAGIC, MAGIC_GRID) or count < 2 or not GRID_BYTES <= size < whole.size:
         return found
+    if count > MOST_TOGETHER:
+        whole.fail(f"says that {count} grids are packed together, at most {MOST_TOGETHER} can be read")
     found, at = [(name, size)], size
     while len(found) < count and whole.size - at >= GRID_BYTES:
         header = whole.take(at, GRID_BYTES)

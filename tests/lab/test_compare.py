@@ -277,7 +277,7 @@ def test_what_only_the_first_open_pays_for_is_not_the_first_combination_s(monkey
         return trial
 
     monkeypatch.setattr("clvol.lab.comparison.combine.Trial.open", opened)
-    scene = SimpleNamespace(integrator=SimpleNamespace(choices={}))
+    scene = SimpleNamespace(integrator=SimpleNamespace(choices={}, aovs=()))
     lineup = open_lineup(None, scene, names_asked({"techniques": "delta,spectral"}))
     assert [trial.precompute_seconds for trial in lineup.trials.values()] == [0.21, 0.21]
 

@@ -160,6 +160,18 @@ def test_labels_lie_where_the_volume_is(shown: clvol.Result) -> None:
     assert (low, high) == (180, 1500)
 
 
+def test_a_camera_in_the_volume_has_no_endless_axes(shown: clvol.Result) -> None:
+    """What is next to the camera's plane is seen a million pixels away, or nowhere."""
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+    assert shown.scenery is not None
+    usual = shown.plot()
+    for near in (1e-6, 1e-30, 0.0):
+        inside = shown.scenery.corner + near * shown.scenery.edges.sum(axis=0)
+        figure = replace(shown, scenery=replace(shown.scenery, start=inside)).plot()
+        assert max(figure.get_size_inches()) < 4 * max(usual.get_size_inches())
+        assert len(figure.axes[0].texts) < 80
+
+
 def test_labels_that_cannot_be_are_refused(shown: clvol.Result, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib", reason="matplotlib is not installed")
     for wrong in (-1, 1e6, "long", float("nan")):

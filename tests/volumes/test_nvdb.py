@@ -167,6 +167,12 @@ def test_grids_of_one_handle_are_all_found_where_they_are_packed_together(tmp_pa
     path.write_bytes(bytes(head) + damaged)
     with pytest.raises(VolumeError, match="grid 1 of 3 that are packed together is none"):
         list_nvdb(path)
+    struct.pack_into("<I", grids[0], 28, 1 << 20)
+    damaged = packed(b"".join(grids), codec)
+    struct.pack_into("<Q", head, 24, len(damaged))
+    path.write_bytes(bytes(head) + damaged)
+    with pytest.raises(VolumeError, match="says that 1048576 grids are packed together"):
+        list_nvdb(path)
 
 
 def test_grids_are_found_by_name_and_number_in_all_segments(tmp_path, caplog):
