@@ -182,10 +182,11 @@ def render(
     first = outputs if frames is None else frames.first_outputs
     read = {scene: "the scene"} | ({asked.given["light"]: "the light"} if asked.given.get("light") else {})
     _check_files(read, first, trace, shown, bool(options["aov"]))
-    check_alone(options | extent | {"resume": options["resume"] or None}, scene_chooses=not asked.is_volume)
+    resumes = options.pop("resume") or None
+    options["resume"] = resumes and _picture_to_go_on_from(outputs, frames is not None)
+    check_alone(options | extent | {"resume": resumes}, scene_chooses=not asked.is_volume)
     console, profiled = error_console(), options.pop("profile")
     options |= extent | {"profile": profiled or trace is not None}
-    options["resume"] = _picture_to_go_on_from(outputs, frames is not None) if options["resume"] else None
     with logging_to(console, verbose), _tev_at(tev) as viewer:
         painter = Painter(asked, options, shown, trace, quiet, console, viewer)
         if frames is not None:
