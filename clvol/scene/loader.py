@@ -258,8 +258,9 @@ def _build(root: Node, source: str, grids: Grids | None, faults: Faults) -> Scen
     chosen = Integrator()
     try:
         chosen = _integrator(records["integrator"], _what_has_media(sensors, shapes))
-        _check_emitters(emitters)
-        _check_used(records, library)
+        if not faults:  # otherwise what refers to them may be lost
+            _check_emitters(emitters)
+            _check_used(records, library)
         if not sensors and not faults:
             hint = 'add a <sensor type="perspective">'
             raise SceneError("the scene has no sensor", root.where, hint)

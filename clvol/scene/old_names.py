@@ -89,7 +89,10 @@ RULES: dict[tuple[str, str], Rule] = {
     ("emitter", "directional"): Rule(renamed={"intensity": "irradiance"}),
     ("integrator", "vrl"): Rule(
         "volpath",
-        dropped=("light_emissions", "use_light_cut", "short_vrls"),
+        dropped=(
+            *("light_emissions", "use_light_cut", "short_vrls", "max_passes", "vrl_target_num"),
+            *("max_particle_depth", "initial_specular_throughput"),
+        ),
         said="volpath, which has the same expectation",
     ),
     ("integrator", "volpathsimple"): Rule("volpath_simple"),
