@@ -102,11 +102,6 @@ def test_misnamed_volumes_are_not_said_to_be_unwelcome(load):
     )
 
 
-def test_sigma_s_is_told_in_terms_of_albedo(load):
-    medium = '<medium type="homogeneous" id="m"><float name="sigma_s" value="1"/></medium>'
-    assert "give sigma_t, which is sigma_a + sigma_s, and albedo" in error_of(load, medium)
-
-
 def test_a_light_that_is_never_sampled_is_an_error(load):
     light = '<emitter type="point"><float name="sampling_weight" value="0"/></emitter>'
     assert "sampling_weight is 0" in error_of(load, light)
@@ -131,15 +126,11 @@ def test_lights_whose_variance_is_no_float_are_refused(load, light):
 # -- old files, and what is no file --------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("version", "hint"),
-    [("0.6.0", "names as Mitsuba 3 has them (sigmaT is sigma_t)"), ("4.0.0", "for Mitsuba 2 and 3, write")],
-)
-def test_other_versions_are_told_what_to_change(tmp_path, version, hint):
+@pytest.mark.parametrize("version", ["4.0.0", "3", "x"])
+def test_other_versions_are_told_what_to_change(tmp_path, version):
     (tmp_path / "scene.xml").write_text(f'<scene version="{version}"/>')
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(SceneError, match="for Mitsuba 2 and 3, write"):
         load_file(tmp_path / "scene.xml")
-    assert hint in str(caught.value)
 
 
 def test_text_and_other_things_are_no_file_names():
