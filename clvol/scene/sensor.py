@@ -73,6 +73,25 @@ def _sensor(reader: Reader, camera: Camera) -> Sensor:
     )
 
 
+def batch(reader: Reader) -> tuple[Sensor, ...]:
+    """The `batch` plugin: its sensors, each with a part of the film, which Mitsuba sets side by side.
+
+    Their own films and samplers are superseded by those of the batch.
+    """
+    found: list[Sensor] = [reader.build(node) for _, node in reader.children("sensor")]
+    film_node, sampler_node = reader.only_child("film"), reader.only_child("sampler")
+    film = reader.build(film_node) if film_node else Film()
+    if not found:
+        reader.fail("a batch needs at least one sensor inside")
+    if film.crop or film.width % len(found):
+        what = f"the width of a batch's film, {film.width}, must be a multiple of its {len(found)} sensors"
+        reader.fail("the film of a batch takes no crop window" if film.crop else what)
+    part = replace(film, width=film.width // len(found))
+    sampler = reader.build(sampler_node) if sampler_node else Sampler()
+    reader.approximated(f"{len(found)} sensors, with a picture each (--sensor N)")
+    return tuple(replace(sensor, film=part, sampler=sampler) for sensor in found)
+
+
 def _field_of_view(reader: Reader) -> tuple[float, str]:
     """(degrees, axis) from `fov` and `fov_axis`, or from a focal length."""
     if reader.has("fov"):

@@ -139,6 +139,14 @@ PARAMETERS = {
         {name: CAMERA[name] for name in ("near_clip", "far_clip", "film", "sampler", "medium")}
         | {"to_world": np.diag([2.0, 1.0, 1.0, 1.0]), "focus_distance": Silent(2.0)},
     ),
+    "batch": (
+        {"inner": {"type": "perspective", "fov": 40.0}},
+        {
+            "inner": {"type": "perspective", "fov": 50.0},
+            "film": {"type": "hdrfilm", "width": 5},
+            "sampler": {"type": "independent", "seed": 7},
+        },
+    ),
     "hdrfilm": (
         {"width": 8, "height": 9},
         {
