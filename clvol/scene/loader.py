@@ -29,6 +29,7 @@ from clvol.scene.faults import MOST_SKIPPED, EnoughError, Faults, LostError, Uns
 from clvol.scene.library import Grids, Library, PluginTable
 from clvol.scene.mesh_files import FORMATS
 from clvol.scene.nodes import Node, from_dict
+from clvol.scene.pbrt.translation import is_pbrt, read_pbrt
 from clvol.scene.records import ConstantEmitter, EnvmapEmitter, Integrator, Scene, Sensor, Shape
 from clvol.scene.vocabulary import listed
 from clvol.scene.xml import read_xml, read_xml_text
@@ -118,6 +119,9 @@ PLUGINS: PluginTable = {
 }
 """Kind -> plugin name -> the function that builds its record."""
 
+_WITH_MESHES: PluginTable = {**PLUGINS, "shape": {**PLUGINS["shape"], "trianglemesh": shape.trianglemesh}}
+"""The same with the shape that readers of other formats put their meshes into."""
+
 IN_SCENES = ("integrator", "sensor", "shape", "emitter")
 """Kinds that a scene is made of; the others are parts of these."""
 
@@ -125,12 +129,12 @@ log = logging.getLogger("clvol")
 
 
 def load_file(path: str | Path, **defaults: object) -> Scene:
-    """Read a Mitsuba 3 XML scene.
+    """Read a Mitsuba 3 XML scene, or one of PBRT-v4 (.pbrt, .pbrt.gz).
 
     Parameters
     ----------
     path : str or Path
-        The XML file.  Files it names are looked for in its `<path>`s (the last first), then in its folder.
+        The file.  Files that XML names are looked for in its `<path>`s (the last first), then in its folder.
     **defaults
         Values that replace those of `<default name= value=>`.
 
@@ -148,6 +152,10 @@ def load_file(path: str | Path, **defaults: object) -> Scene:
     """
     if not isinstance(path, str | os.PathLike):
         raise SceneError(f"load_file takes a file's name, not {shown(path)}", hint="load_dict takes dicts")
+    if is_pbrt(path):
+        return _loaded(
+            lambda faults: read_pbrt(Path(path), defaults, faults), str(path), plugins=_WITH_MESHES
+        )
     return _of_xml(lambda faults: read_xml(Path(path), defaults, faults), source=str(path))
 
 
@@ -237,23 +245,27 @@ def _of_xml(read: Callable[[Faults], Node], source: str = "") -> Scene:
 
 
 def _loaded(
-    read: Callable[[Faults], Node], source: str = "", grids: Grids | None = None, files: Iterable[str] = ()
+    read: Callable[[Faults], Node],
+    source: str = "",
+    grids: Grids | None = None,
+    files: Iterable[str] = (),
+    plugins: PluginTable = PLUGINS,
 ) -> Scene:
     """The scene of the nodes that `read` returns, which knows what files it was read from."""
     faults = Faults()
     with files_noted() as noted:
         try:
-            scene = _build(read(faults), source, grids, faults)
+            scene = _build(read(faults), source, grids, faults, plugins)
         except EnoughError:
             faults.check()
             raise SceneError(f"more than {MOST_SKIPPED} parts are not supported", source) from None
     return replace(scene, files=tuple(dict.fromkeys((*files, *noted))))
 
 
-def _build(root: Node, source: str, grids: Grids | None, faults: Faults) -> Scene:
+def _build(root: Node, source: str, grids: Grids | None, faults: Faults, plugins: PluginTable) -> Scene:
     if root.type != "scene":
         raise SceneError(f"expected a scene, got a '{root.type}'", root.where)
-    library = Library(root, PLUGINS, grids, faults)
+    library = Library(root, plugins, grids, faults)
     records = _records(root, library)
     sensors = _sensors(records["sensor"])
     shapes = groups.all_shapes(record for _, record in records["shape"])

@@ -100,6 +100,16 @@ def mesh(reader: Reader) -> Shape:
     return _shape(reader, "mesh", reader.transform() @ translate(origin), read)
 
 
+def trianglemesh(reader: Reader) -> Shape:
+    """The `trianglemesh` plugin, for readers of other formats: a `Mesh` that is made already, as `mesh`."""
+    made = reader.raw("mesh")
+    if not isinstance(made, Mesh):
+        reader.fail(
+            "a trianglemesh needs a mesh that was read from a scene of another format", hint="use ply"
+        )
+    return _shape(reader, "mesh", reader.transform(), made)
+
+
 def _shape(reader: Reader, kind: str, to_world: np.ndarray, triangles: Mesh | None = None) -> Shape:
     """A shape with what is inside it.  Without a BSDF it is diffuse, or black if it emits, as in Mitsuba."""
     try:

@@ -1,0 +1,269 @@
+"""PBRT-v4 scenes: what statements and parameters mean in the records of a scene."""
+
+from __future__ import annotations
+
+import gzip
+
+import numpy as np
+import pytest
+
+import clvol
+from clvol.scene.records import ConstantEmitter, ConstVolume, GridVolume
+
+CAMERA = """
+LookAt 0 0 -5  0 0 0  0 1 0
+Camera "perspective" "float fov" 40
+Film "rgb" "integer xresolution" 60 "integer yresolution" 40
+PixelFilter "box"
+"""
+
+
+@pytest.fixture
+def load(tmp_path):
+    """Loads a scene of this text, with a camera and a world around it."""
+
+    def load(world: str, before: str = CAMERA):
+        path = tmp_path / "scene.pbrt"
+        path.write_text(f"{before}\nWorldBegin\n{world}\n")
+        return clvol.load_file(path)
+
+    return load
+
+
+def projected(scene, point):
+    """Column and row of a point in the picture, by the camera's record alone."""
+    x, y, z, _ = np.linalg.inv(scene.sensor.to_world) @ [*point, 1]
+    half = np.tan(np.deg2rad(scene.sensor.fov) / 2)
+    width, height = scene.film.width, scene.film.height
+    left, up = np.array([x, y]) / z / half  # local +x is the picture's left
+    return (1 - left) * width / 2, height / 2 - up * width / 2
+
+
+def test_a_picture_is_not_mirrored(load):
+    """It is left-handed: with the eye at -5, y up, +x is on the right, and fov 40 is the shorter side's."""
+    scene = load('Shape "sphere"')
+    unit = 20 / np.tan(np.deg2rad(20))  # pixels at depth 1
+    assert projected(scene, (1, 0.5, 0)) == pytest.approx((30 + unit / 5, 20 - unit / 10))
+
+
+def test_a_mirrored_camera_mirrors(load):
+    scene = load('Shape "sphere"', "Scale -1 1 1" + CAMERA)
+    assert projected(scene, (1, 0, 0))[0] < 30
+
+
+def test_a_screen_window_moves_and_crops(load):
+    camera = CAMERA.replace('"float fov" 40', '"float fov" 90 "float screenwindow" [0 3 -1 1]')
+    scene = load('Shape "sphere"', camera)
+    assert scene.sensor.principal_point_offset == pytest.approx((0.5, 0.0))
+    assert scene.sensor.fov == pytest.approx(2 * np.rad2deg(np.arctan(1.5)))
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"), [("", 6), ('"integer maxdepth" 0', 1), ('"integer maxdepth" 7', 8)]
+)
+def test_depth_counts_segments_and_not_scatterings(load, given, expected):
+    scene = load('Shape "sphere"', f'{CAMERA} Integrator "volpath" {given}')
+    assert scene.integrator.max_depth == expected
+
+
+def test_transforms_go_from_the_inside_out(load):
+    scene = load('Translate 1 2 3 Rotate 90 0 0 1 Scale 2 2 2 Shape "sphere" "float radius" .5')
+    moved = scene.shapes[0].to_world @ [1, 0, 0, 1]
+    assert moved[:3] == pytest.approx([1, 3, 3])
+
+
+def test_a_matrix_is_written_by_columns_and_blocks_restore(load):
+    scene = load(
+        'AttributeBegin Transform [1 0 0 0  0 1 0 0  0 0 1 0  4 5 6 1] Shape "sphere" AttributeEnd '
+        'Shape "sphere"'
+    )
+    places = [shape.to_world[:3, 3].tolist() for shape in scene.shapes]
+    assert places == [[4, 5, 6], [0, 0, 0]]
+
+
+def test_instances_stand_under_their_own_transform(load):
+    scene = load(
+        'ObjectBegin "a" Translate 1 0 0 Shape "sphere" ObjectEnd '
+        'Scale 2 2 2 ObjectInstance "a" Translate 0 1 0 ObjectInstance "a"'
+    )
+    assert [shape.to_world[:3, 3].tolist() for shape in scene.shapes] == [[2, 0, 0], [2, 2, 0]]
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+@pytest.mark.parametrize("mirror", [1, -1])
+def test_normals_keep_their_side_under_a_mirror(load, reverse, mirror):
+    """Triangles face the same way as without the mirror; ReverseOrientation turns them."""
+    scene = load(
+        f"{'ReverseOrientation' if reverse else ''} Scale {mirror} 1 1 "
+        'Shape "trianglemesh" "point3 P" [0 0 0 1 0 0 0 1 0] "integer indices" [0 1 2]'
+    )
+    shape = scene.shapes[0]
+    corners = (shape.to_world[:3, :3] @ shape.mesh.vertices[shape.mesh.faces[0]].T).T
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    assert (normal[2] > 0) == (not reverse)
+
+
+def test_vertex_normals_say_where_a_triangle_faces(load):
+    scene = load(
+        'Shape "trianglemesh" "point3 P" [0 0 0 1 0 0 0 1 0] "normal N" [0 0 -1 0 0 -1 0 0 -1] '
+        '"integer indices" [0 1 2]'
+    )
+    mesh = scene.shapes[0].mesh
+    a, b, c = mesh.vertices[mesh.faces[0]]
+    assert np.cross(b - a, c - a)[2] < 0
+
+
+def test_files_are_included_and_unpacked(load, tmp_path):
+    (tmp_path / "more.pbrt").write_text('Translate 1 0 0 MakeNamedMedium "m" "string type" "homogeneous"')
+    ply = b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    ply += (
+        b"element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    )
+    (tmp_path / "a.ply.gz").write_bytes(gzip.compress(ply))
+    scene = load(
+        'Include "more.pbrt" "rgb sigma_a" [1 2 3] "rgb sigma_s" [0 2 1]\n'  # goes on after the file's end
+        'AttributeBegin MediumInterface "m" "" Material "interface" Shape "sphere" AttributeEnd '
+        'Shape "plymesh" "string filename" "a.ply.gz"'
+    )
+    medium = scene.shapes[0].interior
+    assert medium.sigma_t.value == pytest.approx((1, 4, 4))
+    assert medium.albedo.value == pytest.approx((0, 0.5, 0.25))
+    assert scene.shapes[0].to_world[0, 3] == 1
+    assert len(scene.shapes[1].mesh.faces) == 1
+    assert str(tmp_path / "a.ply.gz") in scene.files
+
+
+def test_a_grid_lies_in_its_box_and_fades_at_the_border(load):
+    scene = load(
+        'Translate 10 0 0 MakeNamedMedium "m" "string type" "uniformgrid" "integer nx" 2 "integer ny" 1 '
+        '"integer nz" 1 "float density" [1 3] "point3 p1" [2 1 1] "rgb sigma_a" [1 1 1] '
+        '"rgb sigma_s" [3 3 3] '
+        '"float scale" 2 "float g" .5 "rgb Le" [1 2 3] "float Lescale" [0 2] '
+        'MediumInterface "m" "" Material "interface" Shape "sphere"'
+    )
+    medium = scene.shapes[0].interior
+    assert isinstance(medium.sigma_t, GridVolume) and medium.phase.g == 0.5
+    assert medium.scale == (8.0,) and medium.albedo.value == (0.75,)
+    values = medium.sigma_t.grid.values[..., 0]
+    assert values.shape == (3, 3, 4) and values[1, 1].tolist() == [0, 1, 3, 0]
+    second = medium.sigma_t.index_to_world @ [2, 1, 1, 1]
+    assert second[:3] == pytest.approx([11.5, 0.5, 0.5])
+    assert medium.emission.grid.values[1, 1, :, 0].tolist() == [0, 0, 2, 0]
+    assert medium.emission_scale == pytest.approx((1, 2, 3))
+
+
+def test_an_rgb_light_is_the_colour_of_the_picture(load):
+    """Its luminance and the sensor's integral cancel; spectra and black bodies are of luminance 1."""
+    weights = np.array([0.2126, 0.7152, 0.0722])
+    scene = load('LightSource "infinite" "rgb L" [1 2 3] "float scale" 2 Shape "sphere"')
+    assert scene.emitters == (ConstantEmitter((2.0, 4.0, 6.0)),)
+    for spectrum in ('"spectrum L" [300 7 900 7]', '"blackbody L" 3000', ""):
+        light = load(f'LightSource "infinite" {spectrum} Shape "sphere"').emitters[0]
+        assert weights @ np.broadcast_to(light.radiance, 3) == pytest.approx(1, abs=2e-3)
+
+
+def test_exposure_scales_all_that_emits(load):
+    camera = CAMERA.replace('Film "rgb"', 'Film "rgb" "float iso" 200 "float exposuretime" 2')
+    scene = load(
+        'LightSource "point" "power" 1'.replace('"power"', '"float power"') + ' Shape "sphere"', camera
+    )
+    assert scene.emitters[0].intensity == pytest.approx((4 / (4 * np.pi),))
+
+
+def test_parallel_light_travels_from_from_to_to(load):
+    scene = load(
+        'Rotate 90 0 0 1 LightSource "distant" "point3 from" [1 0 0] "point3 to" [0 0 0] Shape "sphere"'
+    )
+    assert scene.emitters[0].direction == pytest.approx((0, -1, 0))
+
+
+def test_media_round_the_camera_and_without_a_boundary(load):
+    scene = load(
+        'MakeNamedMedium "fog" "string type" "homogeneous" "rgb sigma_a" [0 0 0] "rgb sigma_s" [.1 .1 .1] '
+        'Material "diffuse" Shape "sphere"',
+        f'MediumInterface "" "fog" {CAMERA}',
+    )
+    assert isinstance(scene.sensor.medium.sigma_t, ConstVolume)
+    assert scene.shapes[0].interior is None and scene.shapes[0].exterior is scene.sensor.medium
+
+
+def test_a_boundary_without_media_is_nothing_and_path_sees_none(load):
+    medium = 'MakeNamedMedium "m" "string type" "homogeneous" MediumInterface "m" ""'
+    assert not load('Material "interface" Shape "sphere"').shapes
+    scene = load(f'{medium} Material "diffuse" Shape "sphere"', f'{CAMERA} Integrator "path"')
+    assert scene.shapes[0].interior is None and "media are left out" in "".join(scene.approximated)
+
+
+def test_what_cannot_be_rendered_is_told_at_once(load):
+    with pytest.raises(clvol.SceneError) as caught:
+        load('Shape "curve"\nShape "sphere" "float phimax" 90\nLightSource "projection"')
+    assert [f"scene.pbrt:{line}: " in str(caught.value) for line in (8, 9, 10)] == [True] * 3
+    with clvol.skip_unsupported():
+        assert not load('Shape "curve"\nShape "sphere" "float phimax" 90').shapes
+
+
+@pytest.mark.parametrize(
+    ("world", "told"),
+    [
+        ('Shape "sphere" "float radiu" 2', "did you mean 'radius'"),
+        ('Shape "sphere" "float radius" "two"', "takes numbers"),
+        ('Shape "sphere" "float radius" nan', "'radius' has no value"),
+        ('Shape "sphere" "float radius" [nan]', "must be finite"),
+        ('Shapes "sphere"', "did you mean 'Shape'"),
+        ('NamedMaterial "m" Shape "sphere"', "no material 'm'"),
+        ('MediumInterface "m" "" Shape "sphere"', "no medium 'm'"),
+        ('Include "scene.pbrt"', "includes itself"),
+        ("AttributeBegin", "without its end"),
+        ("AttributeEnd", "without its AttributeBegin"),
+        ('Shape "trianglemesh" "point3 P" [0 0 0 1 0 0 0 1 0] "integer indices" [0 1 9]', "vertex 9 of 3"),
+        (
+            'Texture "t" "float" "scale" "texture tex" "t" Shape "sphere" "texture alpha" "t"',
+            "made of itself",
+        ),
+        ('Scale 0 1 1 Shape "sphere"', "flattens space"),
+        ('Shape "sphere" "float radius" [1', "without its ']'"),
+        ('Shape "sphere', "a string without its end"),
+    ],
+)
+def test_mistakes_are_told_where_they_are(load, world, told):
+    with pytest.raises(clvol.SceneError) as caught:
+        load(world)
+    assert told in str(caught.value) and "scene.pbrt:" in str(caught.value)
+
+
+def test_mutated_files_get_an_error_or_a_scene(load):
+    text = (
+        'AttributeBegin MakeNamedMedium "m" "string type" "uniformgrid" "integer nx" [2] '
+        '"float density" [1 2] '
+        'MediumInterface "m" "" Material "interface" Rotate 20 0 1 0 Shape "sphere" AttributeEnd # a\n'
+        'ObjectBegin "o" Material "dielectric" "float eta" 1.3 Shape "trianglemesh" '
+        '"integer indices" [0 1 2] "point3 P" [0 0 0 1 0 0 0 1 0] ObjectEnd '
+        'ObjectInstance "o" LightSource "infinite" "rgb L" [1 1 1]'
+    )
+    rng = np.random.default_rng(7)
+    pieces = [
+        "[",
+        "]",
+        '"',
+        "#",
+        "-1",
+        "1e99",
+        "nan",
+        "Shape",
+        "\n",
+        "\0",
+        "é",
+        '"float x"',
+        "AttributeEnd",
+        "",
+    ]
+    for _ in range(500):
+        broken = text
+        for _ in range(rng.integers(1, 4)):
+            at = int(rng.integers(len(broken)))
+            cut = int(rng.integers(0, 12))
+            broken = broken[:at] + str(rng.choice(pieces)) + broken[at + cut :]
+        try:
+            load(broken)
+        except clvol.Error as error:
+            assert "scene.pbrt" in str(error)
