@@ -37,7 +37,7 @@ def shown(value: object, longest: int = 60) -> str:
 _START, _NEXT, _END = "\ue000", "\ue001", "\ue002"
 """Round what differs, and between its forms: code points that no text has."""
 _DIFFERS = re.compile(f"{_START}([^{_START}{_END}]*){_END}")
-_COMMAND = {"time_limit": "--time"}
+_COMMAND = {"time_limit": "--time", "checkpoint_every": "--every"}
 """Options that the command line calls otherwise than Python."""
 
 

@@ -40,6 +40,8 @@ def check_alone(given: Mapping[str, Any], scene_chooses: bool = True) -> None:
         check_seed(given["seed"])
     if given["resume"] is not None:
         check_resumed(given)
+    if given["checkpoint"] is not None:
+        check_checkpoints(given)
     names = [given[family] for family in MARCHES]
     if given["step"] is not None and "marching" not in names and not (scene_chooses and "auto" in names):
         raise nothing_marches()
@@ -59,6 +61,25 @@ def check_resumed(given: Mapping[str, Any]) -> None:
         raise OptionError(
             f"{option('resume')} and {option('samples')} exclude each other",
             hint=f"{option('spp')} says how many there are to be",
+        )
+
+
+def check_checkpoints(given: Mapping[str, Any]) -> None:
+    """OptionError for what cannot be asked of a render that leaves checkpoints."""
+    what = option("checkpoint")
+    positive(f"{option('checkpoint_every')} ", given["checkpoint_every"], " of seconds")
+    if given["resume"] is not None:
+        hint = "a checkpoint that is there is gone on from"
+        raise OptionError(f"{what} and {option('resume')} exclude each other", hint=hint)
+    if given["target_error"] is not None:
+        raise OptionError(
+            f"{what} is for renders with as many samples of each pixel, not for {option('target_error')}",
+            hint=f"give {option('spp')} or {option('time_limit')} instead",
+        )
+    if given["technique"] == registry.PILOT:
+        raise OptionError(
+            f"{what} keeps the samples of one technique, and {registry.PILOT} may choose another each time",
+            hint="name the technique that it chose",
         )
 
 

@@ -9,11 +9,11 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from clvol.api.extent import check_alone, sample_range
-from clvol.api.resuming import check_same, resumable, what_is_left
+from clvol.api.resuming import Before, check_same, checkpoint_of, resumable, what_is_left
 from clvol.base.arguments import check_seed, flag
 from clvol.base.progress import Glance, Progress
 from clvol.device.device import open_device
-from clvol.errors import OptionError
+from clvol.errors import OptionError, RenderError
 from clvol.picture.denoising import FEATURES, need_denoiser
 from clvol.picture.merging import merge
 from clvol.planning import registry
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from clvol.device.device import Device
     from clvol.lab.pilot import Found
     from clvol.picture.result import Result
+    from clvol.rendering.checkpoint import Checkpoint, Saved
     from clvol.rendering.profiler import Profiler
 
 log = logging.getLogger("clvol")
@@ -68,6 +69,8 @@ class Order:
     device: str | None
     pool: int | None
     resumed: Result | None
+    checkpoint: Checkpoint | None
+    saved: Saved | None
 
     @classmethod
     def of(cls, function: str, scene: object, given: Mapping[str, Any]) -> Order:
@@ -101,8 +104,10 @@ class Order:
             first, count = what_is_left(resumed, count)
         seed = check_seed(scene.seed if given["seed"] is None else given["seed"])
         extent = first, count, spp, seed, time_limit
+        checkpoint, saved = checkpoint_of(given, scene, first, count)
         where = given["device"], given["pool"]
-        return cls(scene, asked, choices, piloted, *extent, *view, transparent, denoise, *where, resumed)
+        asked_for = scene, asked, choices, piloted, *extent, *view, transparent, denoise, *where
+        return cls(*asked_for, resumed, checkpoint, saved)
 
     def open(self, callback: ProgressCallback | None, profiler: Profiler | None = None) -> Opened:
         """Plan it, and make it ready on the device; `callback` is told of a pilot."""
@@ -125,7 +130,11 @@ class Order:
             plan = plan.having(choices.but(**found.names), reasons)
         session = Session.for_plan(device, self.scene, plan, self.seed, self.pool, spent, profiler)
         if self.resumed is not None:
-            check_same(self.resumed, session)
+            check_same(Before.of(self.resumed), session)
+        if self.saved is not None:
+            check_same(Before.saved(self.saved, session), session)
+            self.saved.put_back(session)
+            log.info("%s has %d samples of each pixel", self.saved.path, self.saved.done)
         session.describe()
         session.warn(self.asked)
         return Opened(self, session, found)
@@ -169,12 +178,33 @@ class Opened:
             return
         had = 0 if order.resumed is None else order.resumed.samples[1]
         total = had + order.count if order.first + order.count < MAX_SAMPLES else None
-        for done in session.passes(order.first, order.count, order.time_limit, urgency):
+        for done in self._done(urgency):
             if callback is not None:
                 with Glance(partial(self.result, done, final=False), callback) as glance:
                     so_far = had + done, total, session.seconds, order.time_limit
                     callback(Progress(*so_far, glance=glance))
             yield done
+
+    def _done(self, urgency: Callable[[], int]) -> Iterator[int]:
+        """Render what the film has from no checkpoint, and leave checkpoints: how many samples are done."""
+        order, session = self.order, self.session
+        done = had = 0 if order.saved is None else order.saved.done
+        if had == order.count:
+            session.seconds = session.earlier
+            yield had
+            return
+        try:
+            for more in session.passes(order.first + had, order.count - had, order.time_limit, urgency):
+                done = had + more
+                if order.checkpoint is not None:
+                    order.checkpoint.offer(session, order.first, done)
+                yield done
+        except RenderError:  # ended before anything new was finished
+            if not had or done > had:
+                raise
+            yield had
+        if order.checkpoint is not None:
+            order.checkpoint.offer(session, order.first, done, last=True)
 
     def result(self, done: int, final: bool = True) -> Result:
         """The picture at so many samples, and those that it goes on from."""

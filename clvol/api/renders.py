@@ -68,6 +68,8 @@ def render(  # type: ignore[misc]  # the options of several views are those of o
     progress: bool | ProgressCallback = False,
     samples: tuple[int, int] | None = None,
     resume: Result | str | PathLike[str] | None = None,
+    checkpoint: str | PathLike[str] | None = None,
+    checkpoint_every: float = 60.0,
     pool: int | None = None,
     profile: bool = False,
 ) -> Result | list[Result]:
@@ -121,6 +123,10 @@ def render(  # type: ignore[misc]  # the options of several views are those of o
     resume
         A picture to go on from, of this scene and seed: a `Result`, or an .exr that has one. Its samples
         count towards `spp`, those that it lacks are rendered, and the result has all.
+    checkpoint, checkpoint_every
+        A file that keeps what the render has, written anew every so many seconds and at the end. If it is
+        there, of this scene, seed, choices and version of clvol, the render goes on from it, to the bits of
+        one that nothing ended. Not with a `target_error`.
     pool
         Paths in flight, for measurements. The picture does not depend on it.
     profile
@@ -180,8 +186,9 @@ def _views(scene: Scene, sensor: Sequence[View], **options: Any) -> list[Result]
     check_scene("render", scene)
     if not sensor:
         raise OptionError("there is no view to render: the list of sensors is empty")
-    if options["resume"] is not None:
-        raise OptionError("resume goes on from one picture", hint="render one view at a time")
+    for name in ("resume", "checkpoint"):
+        if options[name] is not None:
+            raise OptionError(f"{name} is of one picture", hint="render one view at a time")
     for one in sensor:
         viewed(scene, one, options["size"])
     found: list[Result] = []

@@ -56,6 +56,7 @@ Examples:
   clvol render scenes/smoke.xml -o smoke.exr --aov cells --aov largest_weight
   clvol render scenes/room.xml -o room.exr --profile --trace room.json
   clvol render scenes/cloud.xml -o cloud.exr --resume --spp 1024
+  clvol render scenes/cloud.xml -o cloud.exr --spp 4096 --checkpoint cloud.npz
 """
 
 
@@ -111,6 +112,17 @@ class RenderCommand(ExplainedCommand):
     "--resume",
     is_flag=True,
     help="Go on where the first .exr ended, if it is there: its samples count towards --spp.",
+)
+@click.option(
+    "--checkpoint",
+    metavar="FILE",
+    help="Keep there what the render has; if the file is there, go on from it, to the same bits.",
+)
+@positive_option(
+    "--every",
+    "checkpoint_every",
+    metavar="SECONDS",
+    help="How often the checkpoint is written.  [default: 60]",
 )
 @click.option("--quality", type=Quality(), help="How much noise is left; good for volumes by default.")
 @positive_option(
@@ -180,8 +192,9 @@ def render(
     frames = Frames.of(asked, outputs, listed, turntable)
     _check_used(frames, overwrite)
     first = outputs if frames is None else frames.first_outputs
+    _take_checkpoint(options, frames is not None)
     read = {scene: "the scene"} | ({asked.given["light"]: "the light"} if asked.given.get("light") else {})
-    _check_files(read, first, trace, shown, bool(options["aov"]))
+    _check_files(read, first, (options["checkpoint"], trace), shown, bool(options["aov"]))
     resumes = options.pop("resume") or None
     options["resume"] = resumes and _picture_to_go_on_from(outputs, frames is not None)
     check_alone(options | extent | {"resume": resumes}, scene_chooses=not asked.is_volume)
@@ -218,6 +231,15 @@ def _check_used(frames: Frames | None, overwrite: bool) -> None:
         )
 
 
+def _take_checkpoint(options: dict[str, Any], series: bool) -> None:
+    """Refuse what says nothing, and fill in how often."""
+    if options["checkpoint"] is None and options["checkpoint_every"] is not None:
+        raise click.UsageError("--every says how often the --checkpoint is written, and there is none")
+    if options["checkpoint"] is not None and series:
+        raise click.UsageError("--checkpoint is of one picture; of frames, those that are there are kept")
+    options["checkpoint_every"] = options["checkpoint_every"] or 60.0
+
+
 def _picture_to_go_on_from(outputs: Sequence[str], series: bool) -> str | None:
     """The first output that has samples; None where it is not there yet."""
     if series:
@@ -229,7 +251,11 @@ def _picture_to_go_on_from(outputs: Sequence[str], series: bool) -> str | None:
 
 
 def _check_files(
-    read: Mapping[str, str], outputs: Sequence[str], trace: str | None, shown: Shown, aovs: bool
+    read: Mapping[str, str],
+    outputs: Sequence[str],
+    others: tuple[str | None, str | None],
+    shown: Shown,
+    aovs: bool,
 ) -> None:
     """Refuse what could not be written after a long render, and what nothing would be written of."""
     from clvol.picture.profile import check_trace
@@ -237,9 +263,10 @@ def _check_files(
     shown.check(outputs)
     if aovs and not any(output.lower().endswith(".exr") for output in outputs):
         raise click.UsageError("--aov needs an .exr to write to")
+    checkpoint, trace = others
     if trace is not None:
         check_trace(trace)
-    _check_distinct(read, outputs if trace is None else (*outputs, trace))
+    _check_distinct(read, (*outputs, *(other for other in (checkpoint, trace) if other is not None)))
 
 
 def _check_distinct(read: Mapping[str, str], outputs: Sequence[str]) -> None:

@@ -63,6 +63,15 @@ class Film:
         self.samples = np.zeros(listed, np.int64)  # of each pixel, where they are not the same of all
         self.slot_totals = dict.fromkeys(layout.slot_fields(self.plan.macros), 0.0)
 
+    def contents(self) -> dict[str, np.ndarray]:
+        """Every buffer as it is, uint8, by name: with `put_back` no bit is lost."""
+        return {name: self._read(name, (buffer.size,), np.uint8) for name, buffer in self.buffers.items()}
+
+    def put_back(self, contents: dict[str, np.ndarray]) -> None:
+        """Make the buffers what `contents` found."""
+        for name, array in contents.items():
+            cl.enqueue_copy(self.device.queue, self.buffers[name], array, is_blocking=True)
+
     def _read(self, name: str, shape: tuple[int, ...], dtype: npt.DTypeLike) -> np.ndarray:
         array: np.ndarray = np.empty(shape, dtype)
         cl.enqueue_copy(self.device.queue, array, self.buffers[name], is_blocking=True)

@@ -50,7 +50,7 @@ class Session:
     ----------
     setup_seconds : from the scene's records to buffers and kernels.
     kernel_seconds : the part of it that went into building kernels, nothing where a cache has them.
-    seconds : that the last run took.
+    seconds : that the last run took, and `earlier` ones whose film it went on with.
     uploaded, built : bytes of the scene, and kernels, that opening it took.
     """
 
@@ -61,6 +61,7 @@ class Session:
     setup_seconds: float = 0.0
     kernel_seconds: float = 0.0
     seconds: float = 0.0
+    earlier: float = 0.0
     uploaded: int = 0
     built: int = 0
 
@@ -204,13 +205,13 @@ class Session:
             return max(interrupted(), time_limit is not None and spent() >= time_limit)
 
         for done in self.wavefront.passes(first, count, should_stop):
-            self.seconds = spent()
+            self.seconds = self.earlier + spent()
             left = time.perf_counter()
             yield done
             apart += time.perf_counter() - left
         if done == 0:
             raise nothing_finished(interrupted())
-        self.seconds = spent()
+        self.seconds = self.earlier + spent()
 
 
 def _units(prepared: PreparedScene, groups: int, pixels: int) -> tuple[dict[str, Unit], list[Unit]]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import logging
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyopencl as cl
@@ -25,7 +25,7 @@ from clvol.rendering.handled import Handled
 from clvol.rendering.profiler import timed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
     from clvol.device.device import Device
     from clvol.planning.plan import Plan
@@ -374,6 +374,25 @@ class Wavefront:
         """Statistics that slots keep for themselves, combined over the slots."""
         self._harvest()
         return dict(self.film.slot_totals)
+
+    def spent(self) -> dict[str, Any]:
+        """What the samples so far took, and what slots counted: numbers for a checkpoint."""
+        return {
+            "stages": dict(self.seconds),
+            "launches": self.launches,
+            "waves": self.waves,
+            "non_finite": self.non_finite(),
+            "slots": self.slot_statistics(),
+        }
+
+    def take_up(self, film: dict[str, np.ndarray], spent: Mapping[str, Any]) -> None:
+        """Go on where another wavefront was: with its film's buffers, and what it had `spent`."""
+        stages, slots = spent["stages"], spent["slots"]
+        self.seconds = {stage: float(stages[stage]) for stage in self.seconds}
+        self.launches, self.waves = int(spent["launches"]), int(spent["waves"])
+        self.film.slot_totals = {name: float(slots[name]) for name in self.film.slot_totals}
+        self._set_counter(_NON_FINITE, int(spent["non_finite"]))
+        self.film.put_back(film)
 
     def _harvest(self) -> None:
         """Collect what the slots have counted since the last time, and let them begin anew."""
