@@ -270,6 +270,8 @@ def test_options_reach_render_unchanged(scene: str, tmp_path: Path, monkeypatch:
         "samples": None,
         "time_limit": 2.0,
         "resume": None,
+        "checkpoint": None,
+        "checkpoint_every": 60.0,
         "target_error": None,
         "seed": 7,
         "device": "pocl",
