@@ -18,8 +18,7 @@ from clvol.planning.in_force import warnings
 from clvol.planning.registry import FAMILIES
 from clvol.scene.describe import describe_scene, describe_volume
 from clvol.scene.faults import skip_unsupported
-from clvol.scene.loader import load_file
-from clvol.scene.pbrt.translation import is_pbrt
+from clvol.scene.loader import is_scene_file, load_file
 from clvol.scene.records import Scene
 from clvol.version import __version__
 
@@ -88,9 +87,7 @@ def info(
 
 
 def _lines(what: object, grid: str | None, choices: dict[str, Any]) -> list[str]:
-    is_scene = isinstance(what, Scene) or (
-        isinstance(what, str | os.PathLike) and (Path(what).suffix.lower() == ".xml" or is_pbrt(what))
-    )
+    is_scene = isinstance(what, Scene) or (isinstance(what, str | os.PathLike) and is_scene_file(what))
     if choices and not is_scene:
         hint = "give a scene, or leave it out"
         raise OptionError(f"{min(choices)} is for the render of a scene", hint=hint)

@@ -38,12 +38,14 @@ def info(file: str, grid: str | None, definitions: tuple[tuple[str, str], ...], 
 
     FILE is a volume (.vdb, .nvdb, .vol, .npy, .npz, medical images, .tif, .h5 and others, see the formats in
     the documentation): its grids, sizes, boxes, values and memory; a picture that clvol wrote (.exr): how it
-    was made; or a scene (.xml): its camera, film, media and lights, and the plan of its render: the choices
-    that are in force and why, its features, its stages and what is compiled; what of
-    it is refused as not supported, and what is taken as something else.  The choices below are those of
+    was made; or a scene (.xml, .pbrt): its camera, film, media and lights, and the plan of its render: the
+    choices that are in force and why, its features, its stages and what is compiled; what of it is refused
+    as not supported, and what is taken as something else.  The choices below are those of
     `clvol render`.
     """
-    if Path(file).suffix.lower() == ".xml":
+    from clvol.scene.loader import is_scene_file
+
+    if is_scene_file(file):
         if grid is not None:
             raise click.UsageError("--grid chooses from a volume file, and this is a scene")
         _tell_scene(file, dict(definitions), choices)

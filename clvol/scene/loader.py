@@ -128,6 +128,11 @@ IN_SCENES = ("integrator", "sensor", "shape", "emitter")
 log = logging.getLogger("clvol")
 
 
+def is_scene_file(path: str | os.PathLike[str]) -> bool:
+    """Whether a file's name says that it is a scene."""
+    return Path(path).suffix.lower() == ".xml" or is_pbrt(path)
+
+
 def load_file(path: str | Path, **defaults: object) -> Scene:
     """Read a Mitsuba 3 XML scene, or one of PBRT-v4 (.pbrt, .pbrt.gz).
 

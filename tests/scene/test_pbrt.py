@@ -6,8 +6,10 @@ import gzip
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import clvol
+from clvol.cli.main import main
 from clvol.scene.records import ConstantEmitter, ConstVolume, GridVolume
 
 CAMERA = """
@@ -267,3 +269,11 @@ def test_mutated_files_get_an_error_or_a_scene(load):
             load(broken)
         except clvol.Error as error:
             assert "scene.pbrt" in str(error)
+
+
+def test_info_tells_of_a_scene(load, tmp_path):
+    load('Shape "sphere" LightSource "infinite"')
+    told = str(clvol.info(tmp_path / "scene.pbrt"))
+    assert "60 x 40" in told
+    run = CliRunner().invoke(main, ["info", str(tmp_path / "scene.pbrt")])
+    assert run.exit_code == 0 and "60 x 40" in run.output
