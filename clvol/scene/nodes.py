@@ -103,6 +103,9 @@ def from_dict(source: Mapping[str, object], where: str = "scene", depth: int = 0
     if depth > MAX_DEPTH:
         raise SceneError(f"dicts are nested more than {MAX_DEPTH} deep", where, "does one contain itself?")
     if not isinstance(source, Mapping):
+        if _is_loaded(source):
+            hint = "give the dict that mi.load_dict made it from"
+            raise SceneError(f"a Mitsuba {type(source).__name__} is loaded already", where, hint)
         raise SceneError(f"expected a dict, got {type(source).__name__}", where)
     if not isinstance(source.get("type"), str):
         raise SceneError("a dict without a 'type'", where, "give the plugin's name: {'type': 'sphere', ...}")
@@ -117,5 +120,14 @@ def from_dict(source: Mapping[str, object], where: str = "scene", depth: int = 0
         if key == "id" and source["type"] != "ref":
             continue
         path = f"{where}.{key}"
+        if _is_loaded(value):
+            what = f"a Mitsuba {type(value).__name__} that is loaded already tells too little of itself"
+            raise SceneError(what, path, "give the dict that mi.load_dict made it from")
         node.add(key, from_dict(value, path, depth + 1) if isinstance(value, Mapping) else value, path)
     return node
+
+
+def _is_loaded(value: object) -> bool:
+    """Whether it is a plugin of Mitsuba; its bitmaps and grids are arrays too, and taken as such."""
+    made = any((kind.__module__, kind.__name__) == ("mitsuba", "Object") for kind in type(value).__mro__)
+    return made and not hasattr(value, "__array_interface__")

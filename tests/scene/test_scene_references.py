@@ -8,7 +8,7 @@ from places import CASES
 
 import clvol
 from clvol.errors import LONGEST, SceneError
-from clvol.scene import load_dict, load_file, vocabulary
+from clvol.scene import load_dict, load_file, translate, vocabulary
 from clvol.scene.nodes import Node
 from clvol.scene.records import Shape
 
@@ -195,3 +195,40 @@ def test_no_message_is_as_long_as_the_input(load, value):
         f'<bsdf type="{escaped}" id="{escaped}"/>' * 2,
     ):
         assert len(error_of(load, element)) < 3 * LONGEST + 10
+
+
+# -- what Mitsuba has made -----------------------------------------------------------------------------
+
+
+def mitsubas(name, **parts):
+    """An object of a class as Mitsuba's plugins are, with these attributes."""
+    base = type("Object", (), {"__module__": "mitsuba"})
+    return type(name, (base,), {"__module__": "mitsuba", **parts})()
+
+
+def test_arrays_and_transforms_of_mitsuba_are_taken():
+    grid = np.full((2, 3, 4), 0.5, np.float32)
+    volume = {
+        "type": "gridvolume",
+        "grid": mitsubas("VolumeGrid", __array_interface__=grid.__array_interface__),
+    }
+    moved = type("AffineTransform4f", (), {"__module__": "mitsuba", "matrix": translate([1, 2, 3])})()
+    medium = {"type": "heterogeneous", "sigma_t": volume}
+    shape = {"type": "cube", "to_world": moved, "interior": medium, "bsdf": {"type": "null"}}
+    scene = load_dict({"type": "scene", "camera": {"type": "perspective"}, "fog": shape})
+    assert np.array_equal(scene.shapes[0].interior.sigma_t.grid.values[..., 0], grid)
+    assert np.array_equal(scene.shapes[0].to_world, translate([1, 2, 3]))
+
+
+def test_plugins_that_mitsuba_has_loaded_are_refused_with_what_to_do():
+    camera = {"type": "perspective"}
+    for scene, told in (
+        ({"type": "scene", "camera": camera, "ball": mitsubas("Shape")}, "scene.ball: a Mitsuba Shape"),
+        (
+            {"type": "scene", "camera": camera | {"film": mitsubas("Film")}},
+            "scene.camera.film: a Mitsuba Film",
+        ),
+        (mitsubas("Scene"), "scene: a Mitsuba Scene is loaded already"),
+    ):
+        with pytest.raises(SceneError, match=f"{told}.*; give the dict that mi.load_dict made it from"):
+            load_dict(scene)
