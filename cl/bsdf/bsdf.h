@@ -10,6 +10,8 @@
 #include "bsdf/diffuse.h"
 #include "bsdf/kinds.h"
 #include "bsdf/plastic.h"
+#include "bsdf/principled_solid.h"
+#include "bsdf/principled_thin.h"
 #include "bsdf/rough_conductor.h"
 #include "bsdf/rough_dielectric.h"
 #include "bsdf/rough_plastic.h"
@@ -61,6 +63,14 @@ INLINE Spectrum bsdf_value(const Scene *scene, __global const Material *material
     if (IS_BSDF(material, ROUGH_PLASTIC))
         return rough_plastic_value(scene, material, uv, wi, wo, channel, pdf);
 #endif
+#if CLVOL_BSDF_PRINCIPLED || CLVOL_BSDF_PRINCIPLED_GLASS
+    if (IS_BSDF(material, PRINCIPLED) || IS_BSDF(material, PRINCIPLED_GLASS))
+        return solid_value(scene, material, uv, wi, wo, channel, pdf);
+#endif
+#if CLVOL_BSDF_PRINCIPLED_THIN
+    if (IS_BSDF(material, PRINCIPLED_THIN))
+        return sheet_value(scene, material, uv, wi, wo, channel, pdf);
+#endif
     *pdf = 0.0f;
     return (Spectrum)(0.0f);
 }
@@ -101,6 +111,14 @@ INLINE bool bsdf_sample(const Scene *scene, __global const Material *material, f
 #if CLVOL_BSDF_ROUGH_PLASTIC
     if (IS_BSDF(material, ROUGH_PLASTIC))
         return rough_plastic_sample(scene, material, uv, wi, u, v, pick, channel, sample);
+#endif
+#if CLVOL_BSDF_PRINCIPLED || CLVOL_BSDF_PRINCIPLED_GLASS
+    if (IS_BSDF(material, PRINCIPLED) || IS_BSDF(material, PRINCIPLED_GLASS))
+        return solid_sample(scene, material, uv, wi, u, v, pick, channel, sample);
+#endif
+#if CLVOL_BSDF_PRINCIPLED_THIN
+    if (IS_BSDF(material, PRINCIPLED_THIN))
+        return sheet_sample(scene, material, uv, wi, u, v, pick, channel, sample);
 #endif
     delta_sample(sample, -wi, (Spectrum)(1.0f), 1.0f); /* null */
     sample->passes = true;

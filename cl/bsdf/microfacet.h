@@ -7,8 +7,21 @@
 #define CLVOL_BSDF_MICROFACET_H
 #include "core/scene.h"
 
+/* What a distribution is given by.  Where roughness varies over a surface, it is what `material_facets` finds at a point;
+   else the material itself. */
+#if CLVOL_VARIED_ROUGHNESS
+#include "bsdf/facets.h"
+#define FACETS const Facets
+#define LOAD_FACETS(scene, material, uv) const Facets facets = material_facets(scene, material, uv);
+#define FACETS_OF(material) (&facets)
+#else
+#define FACETS __global const Material
+#define LOAD_FACETS(scene, material, uv)
+#define FACETS_OF(material) material
+#endif
+
 /* Density D of the normals m per solid angle and area; m.z > 0. */
-INLINE float microfacet_density(__global const Material *material, float3 m)
+INLINE float microfacet_density(FACETS *material, float3 m)
 {
     const float au = material->alpha_u, av = material->alpha_v;
     const float x = m.x / au, y = m.y / av, cos2 = m.z * m.z;
@@ -23,7 +36,7 @@ INLINE float microfacet_density(__global const Material *material, float3 m)
 }
 
 /* Length of the tangential part of w in units of roughness: tan theta times alpha is this over cos theta. */
-INLINE float stretched_sine(__global const Material *material, float3 w)
+INLINE float stretched_sine(FACETS *material, float3 w)
 {
     const float x = material->alpha_u * w.x, y = material->alpha_v * w.y;
     return sqrt_of(x * x + y * y);
@@ -32,7 +45,7 @@ INLINE float stretched_sine(__global const Material *material, float3 w)
 INLINE float ggx_over_cos(float c, float s) { return 2.0f / (c + sqrt_of(c * c + s * s)); }
 
 /* G1(w) / |cos theta| of the model's values. */
-INLINE float shadowing_over_cos(__global const Material *material, float3 w)
+INLINE float shadowing_over_cos(FACETS *material, float3 w)
 {
     const float c = abs_of(w.z), s = stretched_sine(material, w);
     if (material->distribution == DISTRIBUTION_GGX)
@@ -44,7 +57,7 @@ INLINE float shadowing_over_cos(__global const Material *material, float3 w)
 }
 
 /* G1(w) / |cos theta| of the density of visible normals. */
-INLINE float visibility_over_cos(__global const Material *material, float3 w)
+INLINE float visibility_over_cos(FACETS *material, float3 w)
 {
     const float c = abs_of(w.z), s = stretched_sine(material, w);
     if (material->distribution == DISTRIBUTION_GGX)
@@ -56,10 +69,7 @@ INLINE float visibility_over_cos(__global const Material *material, float3 w)
 }
 
 /* G1(wo) of values. */
-INLINE float shadowing(__global const Material *material, float3 w)
-{
-    return abs_of(w.z) * shadowing_over_cos(material, w);
-}
+INLINE float shadowing(FACETS *material, float3 w) { return abs_of(w.z) * shadowing_over_cos(material, w); }
 
 /* Inverse error function, |x| < 1; relative error about 1e-6 (Giles 2012). */
 INLINE float erf_inverse(float x)
@@ -116,7 +126,7 @@ INLINE float beckmann_slope(float c, float s, float u)
     return slope;
 }
 
-INLINE float3 beckmann_normal(__global const Material *material, float3 w, float u, float v)
+INLINE float3 beckmann_normal(FACETS *material, float3 w, float u, float v)
 {
     const float r2 = w.x * w.x + w.y * w.y, r = sqrt_of(r2);
     const float cos_phi = r > 0.0f ? w.x / r : 1.0f, sin_phi = r > 0.0f ? w.y / r : 0.0f;
@@ -126,7 +136,7 @@ INLINE float3 beckmann_normal(__global const Material *material, float3 w, float
 }
 
 /* Reflecting w on a sphere gives a spherical cap of uniform directions (Dupuy and Benyoub 2023). */
-INLINE float3 ggx_normal(__global const Material *material, float3 w, float u, float v)
+INLINE float3 ggx_normal(FACETS *material, float3 w, float u, float v)
 {
     const float h = (1.0f - v) * (1.0f + w.z), z = h - w.z;
     const float r = sqrt_of(max_of(1.0f - z * z, 0.0f));
@@ -135,7 +145,7 @@ INLINE float3 ggx_normal(__global const Material *material, float3 w, float u, f
 }
 
 /* A normal m, m.z > 0, of density D(m) G1(w) (w·m)+ / cos theta; w.z > 0. */
-INLINE float3 sample_visible_normal(__global const Material *material, float3 w, float u, float v)
+INLINE float3 sample_visible_normal(FACETS *material, float3 w, float u, float v)
 {
     const float3 stretched = unit_of((float3)(material->alpha_u * w.x, material->alpha_v * w.y, w.z));
     const float3 m = material->distribution == DISTRIBUTION_GGX ? ggx_normal(material, stretched, u, v)

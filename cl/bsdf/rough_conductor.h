@@ -11,16 +11,17 @@ INLINE bool rough_conductor_sample(const Scene *scene, __global const Material *
 {
     if (wi.z <= 0.0f)
         return false;
-    const float3 m = sample_visible_normal(material, wi, u, v);
+    LOAD_FACETS(scene, material, uv)
+    const float3 m = sample_visible_normal(FACETS_OF(material), wi, u, v);
     const float cos_m = dot_of(wi, m);
     const float3 wo = 2.0f * cos_m * m - wi;
     if (wo.z <= 0.0f || cos_m <= 0.0f)
         return false;
-    const float visibility = visibility_over_cos(material, wi);
-    const float ratio = shadowing(material, wo) * shadowing_over_cos(material, wi) / visibility;
+    const float visibility = visibility_over_cos(FACETS_OF(material), wi);
+    const float ratio = shadowing(FACETS_OF(material), wo) * shadowing_over_cos(FACETS_OF(material), wi) / visibility;
     const Spectrum weight = ratio * specular_reflectance(scene, material, uv, channel) *
                             conductor_reflectance(material, cos_m, channel);
-    return scattered_sample(sample, wo, weight, 0.25f * visibility * microfacet_density(material, m), 1.0f);
+    return scattered_sample(sample, wo, weight, 0.25f * visibility * microfacet_density(FACETS_OF(material), m), 1.0f);
 }
 
 INLINE Spectrum rough_conductor_value(const Scene *scene, __global const Material *material, float2 uv, float3 wi,
@@ -29,10 +30,11 @@ INLINE Spectrum rough_conductor_value(const Scene *scene, __global const Materia
     *pdf = 0.0f;
     if (wi.z <= 0.0f || wo.z <= 0.0f)
         return (Spectrum)(0.0f);
+    LOAD_FACETS(scene, material, uv)
     const float3 m = normalize(wi + wo);
-    const float density = 0.25f * microfacet_density(material, m);
-    *pdf = density * visibility_over_cos(material, wi);
-    const float value = density * shadowing_over_cos(material, wi) * shadowing(material, wo);
+    const float density = 0.25f * microfacet_density(FACETS_OF(material), m);
+    *pdf = density * visibility_over_cos(FACETS_OF(material), wi);
+    const float value = density * shadowing_over_cos(FACETS_OF(material), wi) * shadowing(FACETS_OF(material), wo);
     return value * specular_reflectance(scene, material, uv, channel) *
            conductor_reflectance(material, dot_of(wi, m), channel);
 }

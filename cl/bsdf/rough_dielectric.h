@@ -9,8 +9,7 @@
 /* Value, pdf and colour apart, of wo by the facet of normal m (m.z > 0): the half vector, reflected or refracted.
    The Jacobian of refraction has |wo·m| eta² / (wi·m + eta wo·m)²; the eta² of the value cancels against the 1 / eta²
    of radiance. */
-INLINE float2 facet_value(__global const Material *material, float3 wi, float3 wo, float3 m, Fresnel fresnel,
-                          bool reflects)
+INLINE float2 facet_value(FACETS *material, float3 wi, float3 wo, float3 m, Fresnel fresnel, bool reflects)
 {
     const float cos_i = dot_of(wi, m), cos_o = dot_of(wo, m);
     if (cos_i * wi.z <= 0.0f || cos_o * wo.z <= 0.0f)
@@ -32,7 +31,8 @@ INLINE bool rough_dielectric_sample(const Scene *scene, __global const Material 
         return false;
     if (material->ior == 1.0f) /* a boundary of nothing: the lobe of refraction is a delta */
         return delta_sample(sample, -wi, specular_transmittance(scene, material, uv, channel), 1.0f);
-    const float3 m = sample_visible_normal(material, wi.z > 0.0f ? wi : -wi, u, v);
+    LOAD_FACETS(scene, material, uv)
+    const float3 m = sample_visible_normal(FACETS_OF(material), wi.z > 0.0f ? wi : -wi, u, v);
     const float cos_m = dot_of(wi, m);
     const Fresnel fresnel = fresnel_dielectric(cos_m, material->ior);
     const bool reflects = happens(pick, fresnel.reflectance);
@@ -40,8 +40,9 @@ INLINE bool rough_dielectric_sample(const Scene *scene, __global const Material 
     const float3 wo = reflects ? 2.0f * cos_m * m - wi : (cos_m * inverse + fresnel.cos_t) * m - inverse * wi;
     if ((wo.z * wi.z > 0.0f) != reflects || wo.z == 0.0f)
         return false;
-    const float pdf = facet_value(material, wi, wo, m, fresnel, reflects).y;
-    const float ratio = shadowing(material, wo) * shadowing_over_cos(material, wi) / visibility_over_cos(material, wi);
+    const float pdf = facet_value(FACETS_OF(material), wi, wo, m, fresnel, reflects).y;
+    const float ratio = shadowing(FACETS_OF(material), wo) * shadowing_over_cos(FACETS_OF(material), wi) /
+                        visibility_over_cos(FACETS_OF(material), wi);
     const Spectrum weight = reflects ? ratio * specular_reflectance(scene, material, uv, channel)
                                      : ratio * inverse * inverse * specular_transmittance(scene, material, uv, channel);
     return scattered_sample(sample, wo, weight, pdf, reflects ? 1.0f : fresnel.eta) && pdf < INFINITY;
@@ -57,9 +58,10 @@ INLINE Spectrum rough_dielectric_value(const Scene *scene, __global const Materi
     const float square = dot_of(m, m);
     if (wi.z * wo.z == 0.0f || material->ior == 1.0f || square == 0.0f)
         return (Spectrum)(0.0f);
+    LOAD_FACETS(scene, material, uv)
     m *= with_sign(1.0f / sqrt_of(square), m.z);
     const Fresnel fresnel = fresnel_dielectric(dot_of(wi, m), material->ior);
-    const float2 found = facet_value(material, wi, wo, m, fresnel, reflects);
+    const float2 found = facet_value(FACETS_OF(material), wi, wo, m, fresnel, reflects);
     *pdf = found.y;
     return found.x * (reflects ? specular_reflectance(scene, material, uv, channel)
                                : specular_transmittance(scene, material, uv, channel));

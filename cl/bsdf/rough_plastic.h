@@ -25,12 +25,13 @@ INLINE Spectrum rough_plastic_value(const Scene *scene, __global const Material 
     if (wi.z <= 0.0f || wo.z <= 0.0f)
         return (Spectrum)(0.0f);
     const float in = coat_transmittance(scene, material, wi.z), out = coat_transmittance(scene, material, wo.z);
+    LOAD_FACETS(scene, material, uv)
     const float3 m = normalize(wi + wo);
-    const float density = 0.25f * microfacet_density(material, m);
-    const float coat = density * shadowing_over_cos(material, wi) * shadowing(material, wo) *
+    const float density = 0.25f * microfacet_density(FACETS_OF(material), m);
+    const float coat = density * shadowing_over_cos(FACETS_OF(material), wi) * shadowing(FACETS_OF(material), wo) *
                        fresnel_dielectric(dot_of(wi, m), material->ior).reflectance;
     const float probability = coat_probability(material, 1.0f - in);
-    *pdf = lerp(INV_PI * wo.z, density * visibility_over_cos(material, wi), probability);
+    *pdf = lerp(INV_PI * wo.z, density * visibility_over_cos(FACETS_OF(material), wi), probability);
     return coat * specular_reflectance(scene, material, uv, channel) +
            INV_PI * wo.z * in * out * base_albedo(scene, material, uv, channel);
 }
@@ -42,7 +43,8 @@ INLINE bool rough_plastic_sample(const Scene *scene, __global const Material *ma
         return false;
     float3 wo = cosine_direction(u, v);
     if (happens(pick, coat_probability(material, 1.0f - coat_transmittance(scene, material, wi.z)))) {
-        const float3 m = sample_visible_normal(material, wi, u, v);
+        LOAD_FACETS(scene, material, uv)
+        const float3 m = sample_visible_normal(FACETS_OF(material), wi, u, v);
         wo = 2.0f * dot_of(wi, m) * m - wi;
     }
     float pdf;

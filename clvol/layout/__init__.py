@@ -46,6 +46,7 @@ from clvol.layout.path_state import (
     slot_fields,
 )
 from clvol.layout.path_text import state_traffic
+from clvol.layout.principled import PRINCIPLED, PRINCIPLED_NUMBERS, PRINCIPLED_RATES
 from clvol.layout.records import (
     EMITTER,
     ENUMS,
@@ -103,6 +104,9 @@ __all__ = [
     "NO_PRIMITIVE",
     "PATH_STATE",
     "PHASE",
+    "PRINCIPLED",
+    "PRINCIPLED_NUMBERS",
+    "PRINCIPLED_RATES",
     "QUADRIC",
     "QUEUES",
     "QUEUE_LENGTHS_STRIDE",

@@ -27,8 +27,11 @@ BSDF_FACTS = {
     "ROUGH_CONDUCTOR": BsdfFacts(),
     "PLASTIC": BsdfFacts(),
     "ROUGH_PLASTIC": BsdfFacts(),
+    "PRINCIPLED": BsdfFacts(),
+    "PRINCIPLED_GLASS": BsdfFacts(transmits=True),
+    "PRINCIPLED_THIN": BsdfFacts(transmits=True),
 }
-"""By name; wrappers have none of their own."""
+"""By name; masks and two-sided ones have none of their own.  Principled ones that transmit are of glass."""
 
 BSDFS = tuple(BSDF_FACTS)
 """In the order of their numbers on the device."""

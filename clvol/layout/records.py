@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from clvol.layout.bsdfs import BSDFS
+from clvol.layout.principled import PRINCIPLED
 
 
 def _record(*fields: tuple[str, str, int]) -> np.dtype[Any]:
@@ -136,7 +137,7 @@ MATERIAL = _record(
     ("nonlinear", "i", 1),
     ("inner_reflectance", "f", 1),  # of a plastic's coat, for diffuse light from inside
     ("specular_weight", "f", 1),  # how often a plastic's coat is sampled, against its base
-    ("table", "i", 1),  # of a rough plastic: first entry in `material_tables`
+    ("table", "i", 1),  # of what has more: first entry in `material_tables`
 )
 
 TEXTURE = _record(
@@ -213,6 +214,7 @@ ENUMS = {
     "QUADRIC": ("SPHERE", "DISK", "CYLINDER"),
     "MATERIAL": BSDFS,
     "DISTRIBUTION": ("BECKMANN", "GGX"),
+    "PRINCIPLED": PRINCIPLED,
     "TEXTURE": ("BITMAP", "CHECKERBOARD"),
     "WRAP": ("REPEAT", "MIRROR", "CLAMP"),
     "ABSORPTION": ("SAMPLE", "WEIGHT", "MIXED"),

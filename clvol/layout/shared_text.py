@@ -35,7 +35,7 @@ _NUMBERS = (
 """Names in `clvol.layout.constants`, which kernels know by the same."""
 
 
-RARE = ("TABPHASE",)
+RARE = ("TABPHASE", "PRINCIPLED", "PRINCIPLED_GLASS", "PRINCIPLED_THIN")
 """Kinds of material and phase function that few scenes have: what others compile does not name them."""
 
 
@@ -70,22 +70,22 @@ def kinds_text(family: str) -> str:
     In units of these only: macros that occur in a unit decide what is built again.
     """
     names = tuple(BSDF_FACTS) if family == "BSDF" else ENUMS[family]
-    usual, rare = ([n for n in names if (n in RARE) is which] for which in (False, True))
-    parts = [f"#define {family}_KINDS ({_kinds(family, usual)})"]
-    if rare:
-        any_rare = " || ".join(f"CLVOL_{family}_{name}" for name in rare)
-        every = f"#define {family}_KINDS ({_kinds(family, names)})"
-        parts = [f"#if {any_rare}", every, "#else", *parts, "#endif"]
+    rare = [f"CLVOL_{family}_{name}" for name in names if name in RARE]
+    if not rare:
+        return _facts_text(family, names)
+    usual = _facts_text(family, [name for name in names if name not in RARE])
+    return f"#if {' || '.join(rare)}\n{_facts_text(family, names)}#else\n{usual}#endif\n"
+
+
+def _facts_text(family: str, names: Iterable[str]) -> str:
+    names = tuple(names)
+    parts = [f"#define {family}_KINDS ({' + '.join(f'CLVOL_{family}_{name}' for name in names)})"]
     if family == "BSDF":
-        smooth = (name for name, facts in BSDF_FACTS.items() if facts.smooth)
-        transmits = (name for name, facts in BSDF_FACTS.items() if facts.transmits)
+        smooth = (name for name in names if BSDF_FACTS[name].smooth)
+        transmits = (name for name in names if BSDF_FACTS[name].transmits)
         parts += [f"#define IS_SMOOTH(material) {_any_of(smooth)}"]
         parts += [f"#define IS_TRANSMISSIVE(material) {_any_of(transmits)}"]
     return "\n".join(parts) + "\n"
-
-
-def _kinds(family: str, names: Iterable[str]) -> str:
-    return " + ".join(f"CLVOL_{family}_{name}" for name in names)
 
 
 def _any_of(names: Iterable[str]) -> str:

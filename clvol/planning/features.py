@@ -66,6 +66,7 @@ class Features:
     textures: bool = False
     bitmaps: bool = False
     material_tables: bool = False
+    rough_textures: bool = False
     reflecting: bool = False
     samples_at_surfaces: bool = False
     passable: bool = False

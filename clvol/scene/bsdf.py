@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, Any
 
+from clvol.scene.material_facts import is_transmissive
 from clvol.scene.materials import (
     Bitmap,
     Bsdf,
@@ -14,22 +16,26 @@ from clvol.scene.materials import (
     Mask,
     Null,
     Plastic,
+    Principled,
+    PrincipledThin,
     RoughConductor,
     RoughDielectric,
+    Roughness,
     RoughPlastic,
     Spectrum,
     Texture,
     TwoSided,
 )
 from clvol.scene.refraction import INDICES, METALS
-from clvol.scene.texture import constant, texture
+from clvol.scene.texture import constant, roughness, texture
 from clvol.scene.vocabulary import did_you_mean, join_hints, listed
 
 if TYPE_CHECKING:
     from clvol.scene.reader import Reader
 
-TRANSMISSIVE = (Null, Dielectric, RoughDielectric)
 DISTRIBUTIONS = ("beckmann", "ggx")
+MOST_SPECULAR = 12.0
+"""Below 1 / 0.08, where a dielectric would reflect all."""
 
 
 def null(reader: Reader) -> Null:
@@ -92,11 +98,68 @@ def roughplastic(reader: Reader) -> RoughPlastic:
     return RoughPlastic(base, *indices, nonlinear, distribution, alpha, specular)
 
 
+def principled(reader: Reader) -> Principled:
+    """The `principled` plugin: its index is `eta`, or follows from `specular`, which is in units of 8 %."""
+    if reader.has("eta") and reader.has("specular"):
+        reader.fail("give either eta or specular, not both", "specular")
+    eta = reader.number("eta", 1.5, minimum=0.0, open_interval=True)
+    specular = reader.number("specular", 0.5, minimum=0.0, maximum=MOST_SPECULAR)
+    transmits = _share(reader, "spec_trans")
+    if not reader.has("eta"):
+        if transmits != (0.0,) and specular == 0:
+            specular = 1e-3  # a boundary of nothing has no density, as in Mitsuba
+        eta = 2 / (1 - math.sqrt(0.08 * specular)) - 1
+    elif transmits != (0.0,) and eta == 1:
+        eta = 1.001
+    return Principled(
+        **_principled(reader),
+        metallic=_share(reader, "metallic"),
+        clearcoat=_share(reader, "clearcoat"),
+        clearcoat_gloss=_share(reader, "clearcoat_gloss"),
+        spec_trans=transmits,
+        eta=eta,
+        specular_rate=_rate(reader, "main_specular"),
+        clearcoat_rate=_rate(reader, "clearcoat"),
+    )
+
+
+def principledthin(reader: Reader) -> PrincipledThin:
+    """The `principledthin` plugin."""
+    return PrincipledThin(
+        **_principled(reader),
+        spec_trans=_share(reader, "spec_trans"),
+        eta=texture(reader, "eta", 1.5, maximum=math.inf),
+        diff_trans=texture(reader, "diff_trans", 0.0, maximum=2.0),
+        specular_rate=_rate(reader, "specular_reflectance"),
+        specular_transmittance_rate=_rate(reader, "specular_transmittance"),
+        diffuse_transmittance_rate=_rate(reader, "diffuse_transmittance"),
+    )
+
+
+def _principled(reader: Reader) -> dict[str, Any]:
+    """What both principled BSDFs have."""
+    names = ("anisotropic", "spec_tint", "sheen", "sheen_tint", "flatness")
+    return {
+        "base_color": texture(reader, "base_color", 0.5),
+        "roughness": texture(reader, "roughness", 0.5),
+        "diffuse_rate": _rate(reader, "diffuse_reflectance"),
+        **{name: _share(reader, name) for name in names},
+    }
+
+
+def _share(reader: Reader, name: str) -> Texture:
+    return texture(reader, name, 0.0)
+
+
+def _rate(reader: Reader, lobe: str) -> float:
+    return reader.number(f"{lobe}_sampling_rate", 1.0, minimum=0.0)
+
+
 def twosided(reader: Reader) -> TwoSided:
     """The `twosided` plugin: one BSDF for both sides, or the front's and the back's in the order given."""
     found = _nested(reader, most=2)
     for name, bsdf in found:
-        if isinstance(bsdf, (*TRANSMISSIVE, Mask)):
+        if isinstance(bsdf, Null | Dielectric | Mask) or is_transmissive(bsdf):
             reader.fail(
                 "a twosided BSDF takes no BSDF that light passes",
                 name,
@@ -178,13 +241,13 @@ def _metal(reader: Reader) -> tuple[Spectrum, Spectrum]:
     return reader.color("eta", 0.0), reader.color("k", 1.0)
 
 
-def _microfacets(reader: Reader) -> tuple[str, float, float]:
+def _microfacets(reader: Reader) -> tuple[str, Roughness, Roughness]:
     """Distribution, alpha_u and alpha_v."""
     reader.ignore(sample_visible=bool)
     distribution = reader.string("distribution", "beckmann", DISTRIBUTIONS)
     sides = [name for name in ("alpha_u", "alpha_v") if reader.has(name)]
     if sides and (len(sides) == 1 or reader.has("alpha")):
         reader.fail("give either alpha, or both alpha_u and alpha_v", sides[0])
-    alpha = constant(reader, "alpha", 0.1, minimum=0.0)
-    u, v = (constant(reader, name, alpha, minimum=0.0) for name in ("alpha_u", "alpha_v"))
+    alpha = roughness(reader, "alpha", 0.1)
+    u, v = (roughness(reader, name, alpha) for name in ("alpha_u", "alpha_v"))
     return distribution, u, v

@@ -87,6 +87,8 @@ PLUGINS: PluginTable = {
         "roughconductor": bsdf.roughconductor,
         "plastic": bsdf.plastic,
         "roughplastic": bsdf.roughplastic,
+        "principled": bsdf.principled,
+        "principledthin": bsdf.principledthin,
         "twosided": bsdf.twosided,
         "mask": bsdf.mask,
     },

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from clvol.layout import BSDF_FACTS
+from clvol.layout import BSDF_FACTS, PRINCIPLED_NUMBERS
 from clvol.scene.materials import (
     Bitmap,
     Bsdf,
@@ -15,6 +15,8 @@ from clvol.scene.materials import (
     Mask,
     Null,
     Plastic,
+    Principled,
+    PrincipledThin,
     RoughConductor,
     RoughDielectric,
     RoughPlastic,
@@ -31,8 +33,15 @@ _KINDS = {
     RoughConductor: "ROUGH_CONDUCTOR",
     Plastic: "PLASTIC",
     RoughPlastic: "ROUGH_PLASTIC",
+    PrincipledThin: "PRINCIPLED_THIN",
 }
-_COLORS = ("reflectance", "diffuse_reflectance", "specular_reflectance", "specular_transmittance")
+_COLORS = (
+    *("reflectance", "diffuse_reflectance", "specular_reflectance", "specular_transmittance"),
+    "base_color",
+)
+_REFRACT = {"DIELECTRIC", "ROUGH_DIELECTRIC", "PRINCIPLED_GLASS", "PRINCIPLED_THIN"}
+_NUMBERS = ("alpha_u", "alpha_v", *PRINCIPLED_NUMBERS)
+_TABLES = {"ROUGH_PLASTIC", "PRINCIPLED", "PRINCIPLED_GLASS", "PRINCIPLED_THIN"}
 
 
 @dataclass(frozen=True)
@@ -49,7 +58,12 @@ class Side:
 
 def side_kind(bsdf: Bsdf) -> str:
     """Name in `layout.BSDFS` of a BSDF that is no wrapper."""
-    return "THIN_DIELECTRIC" if isinstance(bsdf, Dielectric) and bsdf.thin else _KINDS[type(bsdf)]
+    match bsdf:
+        case Dielectric(thin=True):
+            return "THIN_DIELECTRIC"
+        case Principled():
+            return "PRINCIPLED" if bsdf.spec_trans == (0.0,) else "PRINCIPLED_GLASS"
+    return _KINDS[type(bsdf)]
 
 
 def bsdf_sides(bsdf: Bsdf) -> tuple[Side, Side | None]:
@@ -91,6 +105,11 @@ def _colors(side: Side) -> list[Texture]:
     return [getattr(side.bsdf, name) for name in _COLORS if hasattr(side.bsdf, name)]
 
 
+def _numbers(side: Side) -> list[Texture | float]:
+    """What may be textures beside colours."""
+    return [getattr(side.bsdf, name) for name in _NUMBERS if hasattr(side.bsdf, name)]
+
+
 def _color_is_grey(color: Texture) -> bool:
     if isinstance(color, Bitmap):
         return bool((color.pixels == color.pixels[..., :1]).all())
@@ -119,8 +138,8 @@ def passes_light(bsdf: Bsdf) -> bool:
 
 
 def is_transmissive(bsdf: Bsdf) -> bool:
-    """Whether light may be refracted to the other side: a dielectric, smooth or rough, that is not thin."""
-    return bool(bsdf_kinds(bsdf) & {"DIELECTRIC", "ROUGH_DIELECTRIC"})
+    """Whether light may be scattered to the other side: a dielectric that is not thin, or principled."""
+    return bool(bsdf_kinds(bsdf) & _REFRACT)
 
 
 def reflects(bsdf: Bsdf) -> bool:
@@ -135,12 +154,18 @@ def samples_lights(bsdf: Bsdf) -> bool:
 
 def bsdf_textures(bsdf: Bsdf) -> list[Bitmap | Checkerboard]:
     """Its textures, opacities included, in no particular order."""
-    found = [t for side in _parts(bsdf) for t in (*_colors(side), *side.opacities)]
+    found = [t for side in _parts(bsdf) for t in (*_colors(side), *_numbers(side), *side.opacities)]
     return [t for t in found if isinstance(t, Bitmap | Checkerboard)]
 
 
+def has_rough_textures(bsdf: Bsdf) -> bool:
+    """Whether a microfacet model's roughness has a texture (that of principled ones is in a table)."""
+    sides = [s.bsdf for s in _parts(bsdf) if isinstance(s.bsdf, RoughDielectric | RoughConductor)]
+    return any(isinstance(a, Bitmap | Checkerboard) for s in sides for a in (s.alpha_u, s.alpha_v))
+
+
 def has_textures(bsdf: Bsdf) -> bool:
-    """Whether any colour or opacity varies over the surface."""
+    """Whether anything about it varies over the surface."""
     return bool(bsdf_textures(bsdf))
 
 
@@ -151,4 +176,4 @@ def has_bitmaps(bsdf: Bsdf) -> bool:
 
 def has_tables(bsdf: Bsdf) -> bool:
     """Whether it needs `material_tables`."""
-    return "ROUGH_PLASTIC" in bsdf_kinds(bsdf)
+    return bool(bsdf_kinds(bsdf) & _TABLES)

@@ -43,6 +43,9 @@ class Checkerboard:
 Texture = Spectrum | Bitmap | Checkerboard
 """A colour everywhere the same, or one over (u, v)."""
 
+Roughness = float | Bitmap | Checkerboard
+"""A number everywhere the same, or one over (u, v)."""
+
 
 @dataclass(frozen=True)
 class Null:
@@ -77,8 +80,8 @@ class RoughDielectric:
     int_ior: float = 1.5046
     ext_ior: float = 1.000277
     distribution: str = "beckmann"
-    alpha_u: float = 0.1
-    alpha_v: float = 0.1
+    alpha_u: Roughness = 0.1
+    alpha_v: Roughness = 0.1
     specular_reflectance: Texture = (1.0,)
     specular_transmittance: Texture = (1.0,)
 
@@ -99,8 +102,8 @@ class RoughConductor:
     eta: Spectrum = (0.0,)
     k: Spectrum = (1.0,)
     distribution: str = "beckmann"
-    alpha_u: float = 0.1
-    alpha_v: float = 0.1
+    alpha_u: Roughness = 0.1
+    alpha_v: Roughness = 0.1
     specular_reflectance: Texture = (1.0,)
 
 
@@ -129,6 +132,50 @@ class RoughPlastic:
 
 
 @dataclass(frozen=True, eq=False)
+class Principled:
+    """Burley's principled BSDF: a mixture of diffuse, metallic, coated and refracting lobes.
+
+    `eta`: refractive index of the inside over that of the outside.  Rates say how often lobes are sampled.
+    """
+
+    base_color: Texture = (0.5,)
+    roughness: Texture = (0.5,)
+    anisotropic: Texture = (0.0,)
+    metallic: Texture = (0.0,)
+    spec_trans: Texture = (0.0,)
+    eta: float = 1.5
+    spec_tint: Texture = (0.0,)
+    sheen: Texture = (0.0,)
+    sheen_tint: Texture = (0.0,)
+    flatness: Texture = (0.0,)
+    clearcoat: Texture = (0.0,)
+    clearcoat_gloss: Texture = (0.0,)
+    diffuse_rate: float = 1.0
+    specular_rate: float = 1.0
+    clearcoat_rate: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class PrincipledThin:
+    """The principled BSDF of a sheet; `diff_trans` from 0 to 2, where all diffuse light passes."""
+
+    base_color: Texture = (0.5,)
+    roughness: Texture = (0.5,)
+    anisotropic: Texture = (0.0,)
+    spec_trans: Texture = (0.0,)
+    eta: Texture = (1.5,)
+    spec_tint: Texture = (0.0,)
+    sheen: Texture = (0.0,)
+    sheen_tint: Texture = (0.0,)
+    flatness: Texture = (0.0,)
+    diff_trans: Texture = (0.0,)
+    diffuse_rate: float = 1.0
+    specular_rate: float = 1.0
+    specular_transmittance_rate: float = 1.0
+    diffuse_transmittance_rate: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
 class TwoSided:
     """`front` seen along the normal's side, `back` from the other."""
 
@@ -153,6 +200,8 @@ Bsdf = (
     | RoughConductor
     | Plastic
     | RoughPlastic
+    | Principled
+    | PrincipledThin
     | TwoSided
     | Mask
 )

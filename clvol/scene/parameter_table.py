@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from clvol.layout import PRINCIPLED_NUMBERS
 from clvol.scene import materials, records
 from clvol.scene import parameter_values as values
 from clvol.scene.medium_facts import channels_of
@@ -226,6 +227,8 @@ _COLOURS = {
     "opacity",
     "color0",
     "color1",
+    "base_color",
+    *PRINCIPLED_NUMBERS,
 }
 _NESTED = {"front": "brdf_0", "back": "brdf_1", "nested": "nested_bsdf"}
 
@@ -239,14 +242,14 @@ def _bsdf(bsdf: Any, seen: set[int]) -> Found:
         value = getattr(bsdf, name)
         if name in _NESTED:
             yield from _nested(_NESTED[name], _bsdf(value, seen))
-        elif name in _BSDF_NUMBERS:
+        elif name in _BSDF_NUMBERS and not isinstance(value, materials.Bitmap | materials.Checkerboard):
             yield name, _field(bsdf, name, values.number(0.0))
-        elif name in ("int_ior", "ext_ior"):
+        elif name in ("int_ior", "ext_ior") or (name == "eta" and isinstance(value, float)):
             yield name, _field(bsdf, name, values.number(0.0, exclusive=True))
-        elif name in ("eta", "k"):
+        elif name in ("eta", "k") and isinstance(value, tuple):
             yield f"{name}.value", _colour(bsdf, name, np.inf)
         elif name in _COLOURS and isinstance(value, tuple):
-            yield f"{name}.value", _colour(bsdf, name, 1.0)
+            yield f"{name}.value", _colour(bsdf, name, 2.0 if name == "diff_trans" else 1.0)
         elif isinstance(value, materials.Checkerboard):
             yield from _nested(name, _bsdf(value, seen))
         elif isinstance(value, materials.Bitmap) and id(value) not in seen:

@@ -9,7 +9,7 @@ import numpy as np
 from clvol.base.rows import bands
 from clvol.scene.files import find_parameter
 from clvol.scene.image import image_from_array, read_image
-from clvol.scene.materials import Bitmap, Checkerboard, Texture
+from clvol.scene.materials import Bitmap, Checkerboard, Roughness, Texture
 from clvol.scene.nodes import Node
 
 if TYPE_CHECKING:
@@ -64,8 +64,8 @@ def checkerboard(reader: Reader) -> Checkerboard:
     return Checkerboard(color0, reader.color("color1", 0.2, maximum=1.0), _to_uv(reader))
 
 
-def texture(reader: Reader, name: str, default: float) -> Texture:
-    """Parameter `name`: a number, rgb or spectrum in [0, 1], or a texture.
+def texture(reader: Reader, name: str, default: float, maximum: float = 1.0) -> Texture:
+    """Parameter `name`: a number, rgb or spectrum in [0, maximum], or a texture.
 
     Raises
     ------
@@ -73,13 +73,23 @@ def texture(reader: Reader, name: str, default: float) -> Texture:
         Another plugin, or a value out of range.
     """
     if reader.is_value(name):
-        return reader.color(name, default, maximum=1.0)
+        return reader.color(name, default, maximum=maximum)
     reader.has(name)
     found = reader.children("texture", name)
     if not found:
         reader.refuse_plugin(name, "a number, an rgb, a spectrum or a texture")
     picture: Texture = reader.build(found[0][1])
     return picture
+
+
+def roughness(reader: Reader, name: str, default: Roughness) -> Roughness:
+    """A roughness: a number >= 0, or a texture of them."""
+    if not reader.has(name):
+        return default
+    if reader.is_value(name):
+        return reader.number(name, 0.0, minimum=0.0)
+    found: Roughness = texture(reader, name, 0.0)  # type: ignore[assignment]  # no colour, since it is no value
+    return found
 
 
 def constant(reader: Reader, name: str, default: float, minimum: float) -> float:

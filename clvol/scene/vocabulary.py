@@ -22,7 +22,10 @@ LATER: dict[str, tuple[str, ...]] = {
         *("mesh", "bsplinecurve", "linearcurve", "sdfgrid"),
         *("ellipsoids", "heightfield"),
     ),
-    "bsdf": ("principled", "bumpmap", "normalmap", "blendbsdf"),
+    "bsdf": (
+        *("bumpmap", "normalmap", "blendbsdf", "measured", "measured_polarized", "hair"),
+        *("pplastic", "polarizer", "retarder", "circular"),
+    ),
     "phase": ("sggx",),
     "emitter": ("projector", "directionalarea", "sunsky"),
     "texture": ("mesh_attribute", "volume", "uniform", "srgb", "d65", "blackbody"),

@@ -89,19 +89,24 @@ def _record(side: Side, textures: TextureTable, tables: list[np.ndarray]) -> np.
         ("specular", "specular_reflectance"),
         ("transmittance", "specular_transmittance"),
     ):
+        if "PRINCIPLED" in kind:
+            name = "base_color"
         color = black if side.black else getattr(bsdf, name, black)
         _set_color(record, field, color, textures)
     record["ior"] = getattr(bsdf, "int_ior", 1.0) / getattr(bsdf, "ext_ior", 1.0)
+    if isinstance(bsdf, materials.Principled | materials.PrincipledThin):
+        _set_principled(record, side, textures, tables)
     if isinstance(bsdf, materials.Conductor | materials.RoughConductor):
         record["eta"], record["k"] = (rgb(value) for value in (bsdf.eta, bsdf.k))
     if isinstance(bsdf, materials.RoughDielectric | materials.RoughConductor | materials.RoughPlastic):
-        along_u, along_v = (
-            (bsdf.alpha, bsdf.alpha)
-            if isinstance(bsdf, materials.RoughPlastic)
-            else (bsdf.alpha_u, bsdf.alpha_v)
-        )
         record["distribution"] = layout.enum("DISTRIBUTION", bsdf.distribution)
-        record["alpha_u"], record["alpha_v"] = max(along_u, MIN_ALPHA), max(along_v, MIN_ALPHA)
+        for field in ("alpha_u", "alpha_v"):
+            alpha = bsdf.alpha if isinstance(bsdf, materials.RoughPlastic) else getattr(bsdf, field)
+            record[field] = (
+                -1 - textures.add(alpha, as_number=True)
+                if isinstance(alpha, Bitmap | Checkerboard)
+                else max(alpha, MIN_ALPHA)
+            )
     if isinstance(bsdf, materials.Plastic | materials.RoughPlastic):
         _set_coat(record, bsdf, tables)
     return record
@@ -119,8 +124,30 @@ def _set_coat(
         record["inner_reflectance"] = diffuse_reflectance(1 / ior)
         return
     transmittance, record["inner_reflectance"] = coat_table(bsdf.distribution, bsdf.alpha, ior)
-    record["table"] = sum(len(table) for table in tables)
-    tables.append(transmittance)
+    _add_table(record, transmittance, tables)
+
+
+def _add_table(record: np.ndarray, table: np.ndarray, tables: list[np.ndarray]) -> None:
+    record["table"] = sum(len(other) for other in tables)
+    tables.append(np.asarray(table, np.float32))
+
+
+def _set_principled(record: np.ndarray, side: Side, textures: TextureTable, tables: list[np.ndarray]) -> None:
+    """Each number and its texture, as in `layout.PRINCIPLED`; a black side is a boundary of nothing."""
+    bsdf = materials.Principled(roughness=(1.0,), eta=1.0) if side.black else side.bsdf
+    record["ior"] = bsdf.eta if isinstance(bsdf, materials.Principled) else 1.0
+    rates = {
+        "third_rate": getattr(bsdf, "clearcoat_rate", getattr(bsdf, "specular_transmittance_rate", 0.0)),
+        "fourth_rate": getattr(bsdf, "diffuse_transmittance_rate", 0.0),
+    }
+    numbers = [rates[name] if name in rates else getattr(bsdf, name, 0.0) for name in layout.PRINCIPLED]
+    rows = [
+        (0.0, textures.add(number, as_number=True))
+        if isinstance(number, Bitmap | Checkerboard)
+        else (np.mean(number), -1)
+        for number in numbers
+    ]
+    _add_table(record, np.array(rows).reshape(-1), tables)
 
 
 def _set_color(record: np.ndarray, field: str, color: Texture, textures: TextureTable) -> None:

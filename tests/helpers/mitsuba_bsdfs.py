@@ -62,6 +62,45 @@ BSDFS = {
         "alpha": 0.4,
         "specular_reflectance": TINT,
     },
+    "principled": {
+        "type": "principled",
+        "base_color": RED,
+        "roughness": 0.4,
+        "anisotropic": 0.5,
+        "metallic": 0.3,
+        "spec_tint": 0.4,
+        "sheen": 0.6,
+        "sheen_tint": 0.7,
+        "flatness": 0.3,
+        "clearcoat": 0.8,
+        "clearcoat_gloss": 0.2,
+        "specular": 0.7,
+    },
+    "principled glass": {
+        "type": "principled",
+        "base_color": TINT,
+        "roughness": 0.5,
+        "metallic": 0.1,
+        "spec_trans": 0.8,
+        "eta": 1.4,
+        "spec_tint": 0.5,
+        "clearcoat": 0.3,
+        "main_specular_sampling_rate": 0.7,
+    },
+    "principled sheet": {
+        "type": "principledthin",
+        "base_color": RED,
+        "roughness": 0.6,
+        "anisotropic": 0.4,
+        "spec_trans": 0.5,
+        "spec_tint": 0.3,
+        "sheen": 0.5,
+        "sheen_tint": 0.2,
+        "flatness": 0.4,
+        "diff_trans": 0.8,
+        "eta": 1.4,
+        "diffuse_reflectance_sampling_rate": 0.6,
+    },
 }
 
 
@@ -147,6 +186,29 @@ ggx plastic, 1, 0.121087 0.06082 0.0249035 0.283679
 ggx plastic, 2, 0.208643 0.156011 0.107954 0.397297
 ggx plastic, 3, 0.152751 0.0704703 0.0234727 0.331038
 ggx plastic, 4, 0.053545 0.0227402 0.00573588 0.126474
+principled, 0, 0.701696 0.385034 0.147538 1.18218
+principled, 1, 1.05621 0.589933 0.240223 1.93505
+principled, 2, 0.284439 0.215186 0.163247 0.36199
+principled, 3, 1.03549 0.583067 0.24375 1.80824
+principled, 4, 0.103565 0.0521944 0.0136664 0.069979
+principled glass, 0, 0.186619 0.150405 0.114192 0.377237
+principled glass, 1, 0.234571 0.190516 0.146461 0.5304
+principled glass, 2, 0.44248 0.424653 0.406826 0.605221
+principled glass, 3, 0.214484 0.174265 0.134046 0.451318
+principled glass, 4, 0.0283418 0.0221323 0.0159228 0.0351231
+principled glass, 5, 0.579751 0.511292 0.432121 0.884896
+principled glass, 6, 8.63135 7.61214 6.43343 13.1345
+principled glass, 7, 0.0462074 0.0462074 0.0462074 0.065085
+principled glass, 8, 0.745594 0.657552 0.555733 0.583498
+principled sheet, 0, 0.0695258 0.038499 0.0152289 0.245476
+principled sheet, 1, 0.0663431 0.0376728 0.0161701 0.261933
+principled sheet, 2, 0.0981949 0.0863185 0.0774113 0.194787
+principled sheet, 3, 0.0745341 0.0402076 0.0144627 0.236343
+principled sheet, 4, 0.0452108 0.0229558 0.00626463 0.0529875
+principled sheet, 5, 0.863783 0.431891 0.107973 0.663266
+principled sheet, 6, 1.20799 0.603994 0.150998 0.916718
+principled sheet, 7, 0.0608223 0.033516 0.0130363 0.210503
+principled sheet, 8, 0.0706102 0.0353051 0.00882627 0.069344
 """
 _DELTAS = """
 dielectric, 0, -0.620174 -0.248069 0.744208 1 1 1 1

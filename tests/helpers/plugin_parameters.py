@@ -79,6 +79,12 @@ DIELECTRIC = {
     "specular_transmittance": RGB,
 }
 ROUGH = {"distribution": "ggx", "alpha": 0.3, "sample_visible": Silent(False)}
+PRINCIPLED = {
+    "base_color": RGB,
+    "roughness": TEXTURE,
+    "diffuse_reflectance_sampling_rate": 0.5,
+    **dict.fromkeys(("anisotropic", "spec_tint", "sheen", "sheen_tint", "flatness"), 0.3),
+}
 METAL = {"material": "Au", "specular_reflectance": TEXTURE}
 COAT = {
     "diffuse_reflectance": TEXTURE,
@@ -201,6 +207,25 @@ PARAMETERS = {
     "roughconductor": ({}, METAL | ROUGH),
     "plastic": ({}, COAT),
     "roughplastic": ({}, COAT | ROUGH),
+    "principled": (
+        {},
+        PRINCIPLED
+        | dict.fromkeys(("metallic", "spec_trans", "clearcoat", "clearcoat_gloss"), 0.3)
+        | {"eta": 1.7, "specular": 0.3, "main_specular_sampling_rate": 0.5, "clearcoat_sampling_rate": 0.5},
+    ),
+    "principledthin": (
+        {},
+        PRINCIPLED
+        | {"spec_trans": 0.3, "diff_trans": 1.5, "eta": 1.7}
+        | dict.fromkeys(
+            (
+                "specular_reflectance_sampling_rate",
+                "specular_transmittance_sampling_rate",
+                "diffuse_transmittance_sampling_rate",
+            ),
+            0.5,
+        ),
+    ),
     "twosided": ({"inner": {"type": "diffuse"}}, {"inner": {"type": "plastic"}, "back": {"type": "plastic"}}),
     "mask": ({"inner": {"type": "diffuse"}}, {"inner": {"type": "plastic"}, "opacity": TEXTURE}),
     "homogeneous": ({"emission": 1.0, "temperature": 900.0}, MEDIUM),

@@ -14,6 +14,8 @@ from clvol.scene.materials import (
     Mask,
     Null,
     Plastic,
+    Principled,
+    PrincipledThin,
     RoughConductor,
     RoughDielectric,
     RoughPlastic,
@@ -47,11 +49,25 @@ def rgb(*values):
         ("roughconductor", RoughConductor()),
         ("plastic", Plastic()),
         ("roughplastic", RoughPlastic()),
+        ("principledthin", PrincipledThin()),
     ],
 )
 def test_defaults(plugin, record):
     found = read({"type": plugin})
     assert type(found) is type(record) and vars(found) == vars(record)
+
+
+def test_principled():
+    """Indices by `specular`, and those of a boundary that would be none."""
+    found = read({"type": "principled"})
+    assert vars(found) == vars(Principled()) | {"eta": pytest.approx(1.5)}
+    assert facts.bsdf_kinds(found) == {"PRINCIPLED"} and not facts.is_transmissive(found)
+    glass = read({"type": "principled", "spec_trans": CHECKERS, "eta": 1})
+    assert glass.eta == 1.001 and facts.bsdf_kinds(glass) == {"PRINCIPLED_GLASS"}
+    assert read({"type": "principled", "specular": 0, "spec_trans": 1.0}).eta > 1
+    assert facts.has_textures(read({"type": "roughconductor", "alpha": CHECKERS}))
+    with pytest.raises(SceneError, match="light passes"):
+        read({"type": "twosided", "inner": {"type": "principled", "spec_trans": 0.5}})
 
 
 def test_parameters():
@@ -116,7 +132,6 @@ def test_names_of_indices_and_metals():
         ({"type": "roughdielectric", "alpha_u": 0.1}, "both alpha_u and alpha_v"),
         ({"type": "roughconductor", "alpha": 0.1, "alpha_u": 0.1, "alpha_v": 0.1}, "either alpha"),
         ({"type": "roughconductor", "alpha": -0.1}, ">= 0"),
-        ({"type": "roughconductor", "alpha": CHECKERS}, "a number"),
         ({"type": "roughplastic", "alpha": CHECKERS}, "a number"),
         ({"type": "roughplastic", "alpha_u": 0.1}, "unknown parameter 'alpha_u'"),
         ({"type": "roughconductor", "distribution": "phong"}, "cannot be 'phong'"),
@@ -135,7 +150,11 @@ def test_names_of_indices_and_metals():
             {"type": "mask", "opacity": CHECKERS, "a": {"type": "mask", "opacity": CHECKERS, "b": DIFFUSE}},
             "only one of the masks",
         ),
-        ({"type": "principled"}, "not supported in this version"),
+        ({"type": "bumpmap"}, "not supported in this version"),
+        ({"type": "principled", "eta": 1.5, "specular": 0.5}, "either eta or specular"),
+        ({"type": "principled", "specular": 12.5}, "must be"),
+        ({"type": "principled", "metallic": 1.5}, "must be"),
+        ({"type": "principledthin", "diff_trans": 2.5}, "must be"),
     ],
 )
 def test_errors(description, message):
