@@ -31,6 +31,7 @@ from clvol.scene.mesh_files import FORMATS
 from clvol.scene.nodes import Node, from_dict
 from clvol.scene.pbrt.translation import is_pbrt, read_pbrt
 from clvol.scene.records import ConstantEmitter, EnvmapEmitter, Integrator, Scene, Sensor, Shape
+from clvol.scene.spectrum_plugins import SPECTRA
 from clvol.scene.vocabulary import listed
 from clvol.scene.xml import read_xml, read_xml_text
 
@@ -117,7 +118,7 @@ PLUGINS: PluginTable = {
         "spot": emitter.spot,
         "area": emitter.area,
     },
-    "texture": {"bitmap": texture.bitmap, "checkerboard": texture.checkerboard},
+    "texture": {**SPECTRA, "bitmap": texture.bitmap, "checkerboard": texture.checkerboard},
 }
 """Kind -> plugin name -> the function that builds its record."""
 

@@ -16,6 +16,7 @@ from clvol.errors import SceneError, shown
 from clvol.scene import spectra
 from clvol.scene.faults import UnsupportedError
 from clvol.scene.nodes import NAMELESS, Node
+from clvol.scene.spectrum_plugins import SPECTRA
 from clvol.scene.transforms import as_matrix
 from clvol.scene.vocabulary import did_you_mean, join_hints, listed
 
@@ -188,7 +189,11 @@ class Reader:
     def is_value(self, name: str) -> bool:
         """Whether `name` holds a number or a colour rather than a plugin."""
         value = self.node.get(name)
-        return not isinstance(value, Node) or value.is_value
+        return not isinstance(value, Node) or value.is_value or self._is_spectrum(value)
+
+    def _is_spectrum(self, node: Node) -> bool:
+        """Whether it is a spectrum that is a plugin of its own, which stands for a colour."""
+        return self.library.resolve(node).type in SPECTRA
 
     def color(self, name: str, default: float, light: bool = False, maximum: float = np.inf) -> Spectrum:
         """A number, rgb or spectrum with components in [0, maximum]: one number if grey, else three.
@@ -206,6 +211,11 @@ class Reader:
             rgb = self._rgb(name, value)
         elif value.type == "spectrum":
             rgb = self._spectrum(name, value, light, maximum)
+        elif self._is_spectrum(value):
+            target = self.library.resolve(value)
+            self.library.taken.add(id(target))
+            made = self.build(target)
+            rgb = made.light if light else np.minimum(made.surface, maximum)
         else:
             self._wrong(name, "a number, an rgb or a spectrum", value)
         if not np.isfinite(rgb).all() or (rgb < 0).any() or (rgb > maximum * (1 + ROUNDING)).any():

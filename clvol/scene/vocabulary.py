@@ -28,7 +28,7 @@ LATER: dict[str, tuple[str, ...]] = {
     ),
     "phase": ("sggx",),
     "emitter": ("projector", "directionalarea", "sunsky"),
-    "texture": ("mesh_attribute", "volume", "uniform", "srgb", "d65", "blackbody"),
+    "texture": ("mesh_attribute", "volume"),
 }
 """Kind -> plugins known by name and not supported in this version."""
 

@@ -246,6 +246,10 @@ class _XmlReader:
         elif tag == "alias":
             _no_children(element)
             self.alias(element)
+        elif tag == "spectrum" and "type" in element.attributes:
+            node = self.plugin(element, parent.folders)
+            node.kind = "texture"
+            _add_child(parent, self.substitute(element.attributes.get("name", ""), element), node)
         elif tag in VALUE_TAGS:
             _no_children(element)
             name, value = self.value(element)

@@ -277,6 +277,19 @@ PARAMETERS = {
         {"weight": 0.5, "a": {"type": "isotropic"}, "b": {"type": "rayleigh"}},
         {"weight": 0.2, "a": {"type": "hg"}, "b": {"type": "hg"}},
     ),
+    "uniform": ({}, {"value": 0.5}),
+    "rawconstant": ({}, {"value": 0.5}),
+    "srgb": ({}, {"color": RGB}),
+    "d65": ({}, {"color": RGB, "scale": 0.5}),
+    "regular": ({"values": ".1, .2"}, {"values": ".1, .3", "wavelength_min": 500.0, "wavelength_max": 600.0}),
+    "irregular": (
+        {"values": ".1, .2", "wavelengths": "400, 700"},
+        {"values": ".1, .3", "wavelengths": "500, 700"},
+    ),
+    "blackbody": (
+        {"temperature": 900.0},
+        {"temperature": 950.0, "wavelength_min": 500.0, "wavelength_max": 600.0},
+    ),
     "constant": ({}, LIGHT | {"radiance": RGB, "to_world": Silent(TURNED)}),
     "envmap": (
         {"bitmap": SKY},

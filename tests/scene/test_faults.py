@@ -21,7 +21,7 @@ def scene(*lines):
 
 
 UNSUPPORTED = (
-    '<shape type="cube"><bsdf type="hair"/></shape>',
+    '<shape type="cube"><bsdf type="velvet"/></shape>',
     '<shape type="teapot"/>',
     '<shape type="sphere"><float name="radius" value="0.5"/><float name="radios" value="2"/></shape>',
 )
@@ -44,7 +44,7 @@ def test_all_faults_are_in_one_error_in_order_of_their_lines():
     head, *told, hint = error_of(scene(*lines)).split("\n")
     assert head == "8 faults in the scene:"
     found = [
-        "the text:4: unknown bsdf 'hair'",
+        "the text:4: unknown bsdf 'velvet'",
         "the text:5: unknown shape 'teapot'",
         "the text:6: unknown parameter 'radios' of shape 'sphere'; did you mean 'radius'?",
         "the text:7: file 'nowhere.obj' does not exist",
@@ -99,7 +99,7 @@ def test_what_is_not_supported_can_be_left_out(caplog):
     assert loaded.shapes[1].to_world[0, 0] == 0.5
     assert loaded.shapes[2].interior is None
     assert loaded.left_out == (
-        "the text:4: unknown bsdf 'hair'",
+        "the text:4: unknown bsdf 'velvet'",
         "the text:5: unknown shape 'teapot'",
         "the text:6: unknown parameter 'radios' of shape 'sphere'",
         "the text:7: unknown volume 'fog'",
