@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from clvol.base.arguments import check_seed, positive
@@ -67,6 +68,8 @@ def check_resumed(given: Mapping[str, Any]) -> None:
 def check_checkpoints(given: Mapping[str, Any]) -> None:
     """OptionError for what cannot be asked of a render that leaves checkpoints."""
     what = option("checkpoint")
+    if not isinstance(given["checkpoint"], str | PathLike):
+        raise OptionError(f"{what} takes a file's name, not {shown(given['checkpoint'])}")
     positive(f"{option('checkpoint_every')} ", given["checkpoint_every"], " of seconds")
     if given["resume"] is not None:
         hint = "a checkpoint that is there is gone on from"

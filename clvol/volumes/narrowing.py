@@ -23,9 +23,9 @@ class Narrowing:
         self._peak = 0.0  # of those that are nothing
 
     def __call__(self, numbers: np.ndarray) -> np.ndarray:
-        """The numbers as float32; VolumeError where one is beyond."""
+        """The numbers as float32, the same array where they are; VolumeError where one is beyond."""
         with np.errstate(over="ignore", under="ignore", invalid="ignore"):
-            narrowed = numbers.astype(np.float32)
+            narrowed = numbers.astype(np.float32, copy=False)
         if numbers.dtype.kind != "f" or numbers.dtype.itemsize <= narrowed.dtype.itemsize:
             self._something = True
             return narrowed

@@ -100,5 +100,5 @@ def test_what_is_no_view_is_said(scene, view, message):
 def test_lists_are_for_render(scene):
     with pytest.raises(clvol.OptionError, match="sensor must be a number or a dict"):
         clvol.progressive(scene, sensor=[0], **OPTIONS)
-    with pytest.raises(clvol.OptionError, match="resume goes on from one picture"):
+    with pytest.raises(clvol.OptionError, match="resume is of one picture"):
         clvol.render(scene, sensor=[0], resume="a.exr", **OPTIONS)
