@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import json
 import logging
+import struct
 import time
 import zipfile
+import zlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +32,11 @@ log = logging.getLogger("clvol")
 FORMAT = 1
 _ABOUT = "about"
 _HINT = "give another name, or remove the file to begin anew"
+_DAMAGE = (
+    *(OSError, EOFError, KeyError, TypeError, ValueError, AttributeError, MemoryError, SyntaxError),
+    *(NotImplementedError, RuntimeError, struct.error, zlib.error, zipfile.BadZipFile),
+)
+"""What NumPy and zipfile raise for files that are none."""
 _LARGEST_SHARE = 0.05
 """Of the time that writing may take: then checkpoints are further apart than asked for."""
 
@@ -131,7 +138,7 @@ def read_checkpoint(path: str | PathLike[str]) -> Saved:
             with np.load(file, allow_pickle=False) as arrays:
                 found = {key: np.asarray(arrays[key]) for key in arrays.files}
             return _saved(name, found)
-        except (OSError, EOFError, KeyError, TypeError, ValueError, zipfile.BadZipFile, MemoryError) as error:
+        except _DAMAGE as error:
             raise OptionError(f"is no checkpoint of clvol, or is damaged ({error})", name, _HINT) from None
 
 

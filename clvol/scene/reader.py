@@ -16,7 +16,7 @@ from clvol.errors import SceneError, shown
 from clvol.scene import spectra
 from clvol.scene.faults import UnsupportedError
 from clvol.scene.nodes import NAMELESS, Node
-from clvol.scene.spectrum_plugins import SPECTRA
+from clvol.scene.records import SpectrumColor
 from clvol.scene.transforms import as_matrix
 from clvol.scene.vocabulary import did_you_mean, join_hints, listed
 
@@ -193,7 +193,8 @@ class Reader:
 
     def _is_spectrum(self, node: Node) -> bool:
         """Whether it is a spectrum that is a plugin of its own, which stands for a colour."""
-        return self.library.resolve(node).type in SPECTRA
+        made = self.library.built.get(id(self.library.resolve(node)))
+        return isinstance(made, SpectrumColor)
 
     def color(self, name: str, default: float, light: bool = False, maximum: float = np.inf) -> Spectrum:
         """A number, rgb or spectrum with components in [0, maximum]: one number if grey, else three.

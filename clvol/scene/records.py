@@ -167,6 +167,14 @@ class GridVolume:
 Volume = ConstVolume | GridVolume
 
 
+@dataclass(frozen=True, eq=False)
+class SpectrumColor:
+    """Linear sRGB of a spectrum, float64 (1,) or (3,): of a light, and of anything else."""
+
+    light: np.ndarray
+    surface: np.ndarray
+
+
 @dataclass(frozen=True)
 class PhaseTable:
     """Values of a phase function, up to a factor, between which it is linear in the cosine.

@@ -6,13 +6,13 @@ in it, turned to linear sRGB.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from clvol.errors import shortened
 from clvol.scene import spectra
+from clvol.scene.records import SpectrumColor
 
 if TYPE_CHECKING:
     from clvol.scene.reader import Reader
@@ -20,14 +20,6 @@ if TYPE_CHECKING:
 PLANCK, LIGHT, BOLTZMANN = 6.62607015e-34, 299792458.0, 1.380649e-23
 MAX_NUMBERS = 1 << 16
 """Most wavelengths of a spectrum."""
-
-
-@dataclass(frozen=True, eq=False)
-class SpectrumColor:
-    """Linear sRGB of a spectrum, float64 (1,) or (3,): of a light, and of anything else."""
-
-    light: np.ndarray
-    surface: np.ndarray
 
 
 def uniform(reader: Reader) -> SpectrumColor:
