@@ -148,6 +148,7 @@ def _saved(name: str, found: dict[str, np.ndarray]) -> Saved:
         raise ValueError(f"format {about['format']!r}, not {FORMAT}")
     first, done, metadata, spent = (about[key] for key in ("first", "done", "metadata", "spent"))
     whole = all(isinstance(n, int) and 0 <= n < 2**32 for n in (first, done))
+    whole = whole and all(isinstance(picture, str) for picture in about["pictures"])
     if not (whole and isinstance(metadata, dict) and isinstance(spent, dict)):
         raise ValueError("what it says of itself makes no sense")
     if any(array.dtype != np.uint8 or array.ndim != 1 for array in found.values()):

@@ -19,17 +19,24 @@ NULL_IN_MEDIA = "null"
 """BSDF of a shape that has a medium and no BSDF: light passes.  From version 2 on such a shape is diffuse."""
 
 ON_ALL: dict[str, tuple[str, ...]] = {
-    "shape": ("collapse", "max_smooth_angle", "shape_triangles", "load_materials", "srgb"),
+    "shape": ("collapse", "shape_triangles", "load_materials", "srgb"),
     "sensor": ("shutter_open", "shutter_close"),
     "film": (
         *("attach_log", "high_quality_edges", "file_format", "banner", "filename", "digits", "variable"),
         *("gamma", "exposure", "tonemap_method", "key", "burn", "label_0", "metadata_0"),
     ),
-    "texture": ("max_anisotropy", "cache", "gamma"),
+    "texture": ("max_anisotropy", "cache"),
     "integrator": ("strict_normals",),
     "emitter": ("sampling_weight",),
 }
 """By kind of plugin: parameters that change no expected picture, or only how it is shown."""
+
+
+NOT_HEEDED: dict[tuple[str, str, str], str] = {
+    ("shape", "", "max_smooth_angle"): "vertex normals are those of the file",
+    ("rfilter", "box", "radius"): "the filter is a pixel wide",
+}
+"""By kind, type ("": any) and parameter of plugins: in what the picture is another, which is said."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +45,8 @@ class Rule:
 
     to : its type.  renamed : its parameters' names.  dropped : parameters that change no expected picture.
     values : what a parameter's value is called now, in lower case.  added : (element, name, value) that say
-        what was the default.  said : what it is taken as, where that is something else.
+        what was the default, where none of `unless` is given.  said : what it is taken as, where that is
+        something else.
     """
 
     to: str = ""
@@ -46,17 +54,19 @@ class Rule:
     dropped: tuple[str, ...] = ()
     values: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     added: tuple[tuple[str, str, str], ...] = ()
+    unless: tuple[str, ...] = ()
     said: str = ""
 
 
 _FILM = Rule(
     values={
-        "pixel_format": dict.fromkeys(("luminance", "spectrum", "xyz", "spectrumalpha"), "rgb")
-        | dict.fromkeys(("luminancealpha", "xyza"), "rgba"),
+        "pixel_format": dict.fromkeys(("luminance", "spectrum", "xyz"), "rgb")
+        | dict.fromkeys(("luminancealpha", "xyza", "spectrumalpha"), "rgba"),
         "component_format": {"uint32": "float32"},
     }
 )
 _BITMAP = Rule(values={"filter_type": {"ewa": "bilinear", "trilinear": "bilinear", "isotropic": "bilinear"}})
+_COPPER = Rule(added=(("string", "material", "Cu"),), unless=("eta", "k"))
 _PIXELS = "hdrfilm: pictures are linear, and shown as the command line says"
 
 RULES: dict[tuple[str, str], Rule] = {
@@ -66,12 +76,13 @@ RULES: dict[tuple[str, str], Rule] = {
     ("film", "ldrfilm"): Rule("hdrfilm", values=_FILM.values, said=_PIXELS),
     ("film", "pngfilm"): Rule("hdrfilm", values=_FILM.values, said=_PIXELS),
     ("film", "mfilm"): Rule("hdrfilm", values=_FILM.values, said="hdrfilm, which writes no matrices"),
-    ("rfilter", "box"): Rule(dropped=("radius",)),
     ("rfilter", "sinc"): Rule("lanczos"),
     ("sensor", "perspective"): Rule(dropped=("aperture_radius",)),
     ("bsdf", "diffuse"): Rule(renamed={"diffuse_reflectance": "reflectance"}),
     ("bsdf", "lambertian"): Rule("diffuse", renamed={"diffuse_reflectance": "reflectance"}),
     ("bsdf", "mirror"): Rule("conductor", added=(("string", "material", "none"),)),
+    ("bsdf", "conductor"): _COPPER,
+    ("bsdf", "roughconductor"): _COPPER,
     ("texture", "bitmap"): _BITMAP,
     ("texture", "ldrtexture"): Rule("bitmap", values=_BITMAP.values),
     ("texture", "exrtexture"): Rule("bitmap", values=_BITMAP.values),
@@ -82,7 +93,6 @@ RULES: dict[tuple[str, str], Rule] = {
     ),
     ("volume", "gridvolume"): Rule(dropped=("send_data",), added=(("boolean", "use_grid_bbox", "true"),)),
     ("volume", "constvolume"): Rule(renamed={"color": "value"}),
-    ("emitter", "point"): Rule(renamed={"power": "intensity"}),
     ("emitter", "envmap"): Rule(renamed={"intensity_scale": "scale"}, dropped=("cache",)),
     ("emitter", "constant"): Rule(renamed={"intensity": "radiance"}),
     ("emitter", "area"): Rule(renamed={"intensity": "radiance"}),

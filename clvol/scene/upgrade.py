@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.scene.old_names import NULL_IN_MEDIA, ON_ALL, RULES, TAGS, UV, Rule
+from clvol.scene.old_names import NOT_HEEDED, NULL_IN_MEDIA, ON_ALL, RULES, TAGS, UV, Rule
 from clvol.scene.spectra import srgb_to_linear
 from clvol.scene.xml_tree import Element
 
@@ -71,9 +71,10 @@ def _plugin(element: Element, faults: Faults) -> Element:
     dropped = (*rule.dropped, *ON_ALL.get(kind, ()))
     children = [_parameter(child, rule) for child in element.children]
     children = [child for child in children if child.attributes.get("name") not in dropped]
+    children = [child for child in children if not _is_not_heeded(child, (kind, name), faults)]
     given = {child.attributes.get("name") for child in children}
     for tag, parameter, value in rule.added:
-        if parameter not in given:
+        if parameter not in given and not given.intersection(rule.unless):
             children.append(Element(tag, {"name": parameter, "value": value}, element.where, old=True))
     if rule.said:
         faults.approximate(f"{kind} '{name}' is taken as {rule.said}", element.where)
@@ -81,8 +82,18 @@ def _plugin(element: Element, faults: Faults) -> Element:
     if kind == "shape":
         return _shape(made)
     if kind == "texture":
-        return _texture(made)
+        return _decoded(_texture(made), faults)
     return _grid(made) if name == "gridvolume" else made
+
+
+def _is_not_heeded(child: Element, plugin: tuple[str, str], faults: Faults) -> bool:
+    """Whether a parameter is left out although it changes the picture, which is said."""
+    kind, name = plugin
+    parameter = child.attributes.get("name", "")
+    said = NOT_HEEDED.get((kind, name, parameter)) or NOT_HEEDED.get((kind, "", parameter))
+    if said:
+        faults.approximate(f"'{parameter}' of {kind} '{name}' is not heeded: {said}", child.where)
+    return said is not None
 
 
 def _parameter(element: Element, rule: Rule) -> Element:
@@ -90,7 +101,7 @@ def _parameter(element: Element, rule: Rule) -> Element:
     changed = {"name": rule.renamed[name]} if name in rule.renamed else {}
     names = rule.values.get(name, {})
     key = value.lower().replace(" ", "").replace("_", "")
-    if name in rule.values:
+    if name in rule.values and "$" not in value:
         changed["value"] = names.get(key, value.lower())
     return replace(element, attributes=element.attributes | changed)
 
@@ -122,6 +133,24 @@ def _texture(element: Element) -> Element:
     to_uv = Element("transform", {"name": "to_uv"}, element.where, steps, old=True)
     others = [child for child in element.children if not _named(child, UV)]
     return replace(element, children=[*others, to_uv])
+
+
+def _decoded(element: Element, faults: Faults) -> Element:
+    """A texture of `gamma` 1 is `raw`; one of another than sRGB's is decoded as sRGB, which is said."""
+    gamma = next((child for child in element.children if _named(child, ("gamma",))), None)
+    if gamma is None:
+        return element
+    others = [child for child in element.children if child is not gamma]
+    text = gamma.attributes.get("value", "")
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0 if text.lower() == "srgb" else float("nan")
+    if value == 1:
+        others.append(Element("boolean", {"name": "raw", "value": "true"}, gamma.where, old=True))
+    elif not (value <= 0 or value == 2.2):
+        faults.approximate(f"a texture of gamma {text} is decoded as sRGB", gamma.where)
+    return replace(element, children=others)
 
 
 def _grid(element: Element) -> Element:

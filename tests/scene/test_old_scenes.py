@@ -1,6 +1,7 @@
 """Scenes of Mitsuba 0.3 to 1 mean what they meant: read as version 3 has it in other words."""
 
 import numpy as np
+import OpenImageIO as oiio  # noqa: N813
 import pytest
 
 import clvol
@@ -147,3 +148,55 @@ def test_media_take_scattering_and_absorption_together():
     ):
         with pytest.raises(clvol.SceneError, match=told):
             new(medium.format(parts))
+
+
+METALS = {
+    "": "Cu",
+    '<string name="material" value="Au"/>': "Au",
+    '<string name="material" value="none"/>': "none",
+}
+
+
+@pytest.mark.parametrize("plugin", ["conductor", "roughconductor"])
+def test_a_metal_without_a_name_was_copper(plugin):
+    for given, name in METALS.items():
+        wanted = f'<bsdf type="{plugin}"><string name="material" value="{name}"/></bsdf>'
+        shape = '<shape type="sphere">{}</shape>'.format
+        assert same(old(shape(f'<bsdf type="{plugin}">{given}</bsdf>')), new(shape(wanted)))
+    numbers = '<rgb name="eta" value="1, 2, 3"/><rgb name="k" value="3, 2, 1"/>'
+    own = f'<shape type="sphere"><bsdf type="{plugin}">{numbers}</bsdf></shape>'
+    assert same(old(own), new(own))
+
+
+@pytest.mark.parametrize(
+    ("gamma", "raw", "said"), [("1", True, 0), ("-1", False, 0), ("sRGB", False, 0), ("1.8", False, 1)]
+)
+def test_a_texture_of_gamma_one_is_raw(gamma, raw, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    pixels = oiio.ImageBuf(oiio.ImageSpec(2, 2, 3, "uint8"))
+    oiio.ImageBufAlgo.fill(pixels, (0.5, 0.2, 0.7))
+    pixels.write("a.png")
+
+    def scene(make, parameter):
+        file = '<string name="filename" value="a.png"/>'
+        texture = f'<texture type="bitmap" name="reflectance">{file}{parameter}</texture>'
+        return make(f'<shape type="sphere"><bsdf type="diffuse">{texture}</bsdf></shape>')
+
+    found = scene(old, f'<string name="gamma" value="{gamma}"/>')
+    assert same(found, scene(new, f'<boolean name="raw" value="{str(raw).lower()}"/>'))
+    assert len(found.approximated) == said
+
+
+def test_what_changes_the_picture_and_is_not_heeded_is_said():
+    shape = '<shape type="sphere"><float name="maxSmoothAngle" value="30"/></shape>'
+    sensor = '<sensor type="perspective"><film type="hdrfilm">{}</film></sensor>'.format
+    film = '<string name="pixelFormat" value="spectrumAlpha"/>'
+    film += '<rfilter type="box"><float name="radius" value="2"/></rfilter>'
+    found = old(shape, sensor=sensor(film))
+    assert [("max_smooth_angle" in said, "radius" in said) for said in found.approximated] == [
+        (False, True),
+        (True, False),
+    ]
+    assert found.film.pixel_format == "rgba"
+    wide = sensor('<rfilter type="tent"><float name="radius" value="2"/></rfilter>')
+    assert same(old(sensor=wide), new(sensor=wide))
