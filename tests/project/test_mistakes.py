@@ -79,7 +79,8 @@ def test_a_wrong_vector(name: str, value: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "value"), product(OPTIONS, WRONG))
-def test_a_wrong_option_of_a_render(scene: clvol.Scene, name: str, value: str) -> None:
+def test_a_wrong_option_of_a_render(scene: clvol.Scene, name: str, value: str, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)  # some values are names that a checkpoint may have
     call(clvol.render, scene, **{"spp": 1, "pool": 256, name: WRONG[value]})
 
 
