@@ -82,8 +82,7 @@ class Order:
             Something that won't do, as far as can be told without a device.
         """
         check_alone(given)
-        view = given["sensor"], given["size"]
-        scene = viewed(check_scene(function, scene), *view, given["background"])
+        scene = viewed(check_scene(function, scene), given["sensor"], given["size"], given["background"])
         asked = {family: given[family] for family in registry.FAMILIES}
         transparent = asked["background"] == registry.TRANSPARENT
         if transparent:
@@ -103,11 +102,27 @@ class Order:
             resumed = resumable(given["resume"])
             first, count = what_is_left(resumed, count)
         seed = check_seed(scene.seed if given["seed"] is None else given["seed"])
-        extent = first, count, spp, seed, time_limit
         checkpoint, saved = checkpoint_of(given, scene, first, count)
-        where = given["device"], given["pool"]
-        asked_for = scene, asked, choices, piloted, *extent, *view, transparent, denoise, *where
-        return cls(*asked_for, resumed, checkpoint, saved)
+        return cls(
+            scene=scene,
+            asked=asked,
+            choices=choices,
+            piloted=piloted,
+            first=first,
+            count=count,
+            spp=spp,
+            seed=seed,
+            time_limit=time_limit,
+            sensor=given["sensor"],
+            size=given["size"],
+            transparent=transparent,
+            denoise=denoise,
+            device=given["device"],
+            pool=given["pool"],
+            resumed=resumed,
+            checkpoint=checkpoint,
+            saved=saved,
+        )
 
     def open(self, callback: ProgressCallback | None, profiler: Profiler | None = None) -> Opened:
         """Plan it, and make it ready on the device; `callback` is told of a pilot."""
