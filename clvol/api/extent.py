@@ -12,6 +12,7 @@ from clvol.errors import OptionError, either, option, shown
 from clvol.planning import registry
 from clvol.planning.choices import Choices
 from clvol.planning.refusals import nothing_marches
+from clvol.rendering.checkpoint import is_checkpoint
 from clvol.rendering.session import MAX_SAMPLES
 
 if TYPE_CHECKING:
@@ -39,10 +40,11 @@ def check_alone(given: Mapping[str, Any], scene_chooses: bool = True) -> None:
     sample_range(1, given["spp"], given["time_limit"], given["samples"])
     if given["seed"] is not None:
         check_seed(given["seed"])
-    if given["resume"] is not None:
+    goes_on = is_checkpoint(given["resume"])
+    if given["resume"] is not None and not goes_on:
         check_resumed(given)
-    if given["checkpoint"] is not None:
-        check_checkpoints(given)
+    if given["checkpoint"] is not None or goes_on:
+        check_checkpoints(given, "checkpoint" if given["checkpoint"] is not None else "resume")
     names = [given[family] for family in MARCHES]
     if given["step"] is not None and "marching" not in names and not (scene_chooses and "auto" in names):
         raise nothing_marches()
@@ -65,15 +67,18 @@ def check_resumed(given: Mapping[str, Any]) -> None:
         )
 
 
-def check_checkpoints(given: Mapping[str, Any]) -> None:
-    """OptionError for what cannot be asked of a render that leaves checkpoints."""
-    what = option("checkpoint")
-    if not isinstance(given["checkpoint"], str | PathLike):
-        raise OptionError(f"{what} takes a file's name, not {shown(given['checkpoint'])}")
+def check_checkpoints(given: Mapping[str, Any], name: str) -> None:
+    """OptionError for what cannot be asked of a render that leaves checkpoints, or goes on from one.
+
+    name : of the option that says so.
+    """
+    what = option(name)
+    if not isinstance(given[name], str | PathLike):
+        raise OptionError(f"{what} takes a file's name, not {shown(given[name])}")
     positive(f"{option('checkpoint_every')} ", given["checkpoint_every"], " of seconds")
-    if given["resume"] is not None:
-        hint = "a checkpoint that is there is gone on from"
-        raise OptionError(f"{what} and {option('resume')} exclude each other", hint=hint)
+    if given["resume"] is not None and not is_checkpoint(given["resume"]):
+        hint = f"to go on from a checkpoint, {option('resume')} takes its name"
+        raise OptionError(f"{what} and a picture to {option('resume')} exclude each other", hint=hint)
     if given["target_error"] is not None:
         raise OptionError(
             f"{what} is for renders with as many samples of each pixel, not for {option('target_error')}",

@@ -20,6 +20,7 @@ from clvol.planning import registry
 from clvol.planning.choices import Choices
 from clvol.planning.plan import Plan
 from clvol.rendering.adaptive import TargetRender
+from clvol.rendering.checkpoint import is_checkpoint
 from clvol.rendering.outcome import make_result
 from clvol.rendering.profiler import timed
 from clvol.rendering.session import MAX_SAMPLES, Session
@@ -98,7 +99,7 @@ class Order:
         spp, time_limit = given["spp"], given["time_limit"]
         first, count = sample_range(scene.spp, spp, time_limit, given["samples"])
         resumed = None
-        if given["resume"] is not None:
+        if given["resume"] is not None and not is_checkpoint(given["resume"]):
             resumed = resumable(given["resume"])
             first, count = what_is_left(resumed, count)
         seed = check_seed(scene.seed if given["seed"] is None else given["seed"])

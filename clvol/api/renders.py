@@ -122,7 +122,8 @@ def render(  # type: ignore[misc]  # the options of several views are those of o
         (first, count): render only these of the samples. Results of disjoint ranges `merge`.
     resume
         A picture to go on from, of this scene and seed: a `Result`, or an .exr that has one. Its samples
-        count towards `spp`, those that it lacks are rendered, and the result has all.
+        count towards `spp`, those that it lacks are rendered, and the result has all. Or a checkpoint's file:
+        the result has the bits of a render that nothing ended.
     checkpoint, checkpoint_every
         A file that keeps what the render has, written anew every so many seconds and at the end. If it is
         there, of this scene, seed, choices and version of clvol, the render goes on from it, to the bits of

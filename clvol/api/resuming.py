@@ -14,7 +14,7 @@ from clvol.picture.estimate import Uneven
 from clvol.picture.loading import load_result
 from clvol.picture.merging import differences
 from clvol.picture.result import Result
-from clvol.rendering.checkpoint import Checkpoint, Saved, check_count, read_checkpoint
+from clvol.rendering.checkpoint import Checkpoint, Saved, check_count, is_checkpoint, read_checkpoint
 from clvol.rendering.outcome import metadata_of, picture_names
 from clvol.rendering.session import MAX_SAMPLES
 
@@ -67,16 +67,26 @@ class Before:
 def checkpoint_of(
     given: Mapping[str, Any], scene: Scene, first: int, count: int
 ) -> tuple[Checkpoint | None, Saved | None]:
-    """Where checkpoints go, and the one that is there: its render goes on.  OptionError for what won't do."""
-    path = given["checkpoint"]
-    if path is None:
-        return None, None
-    check_file(path)
-    check_spares(path, scene.files)
-    saved = read_checkpoint(path) if os.path.lexists(path) else None
-    if saved is not None:
-        check_count(saved, first, count)
-    return Checkpoint(path, given["checkpoint_every"]), saved
+    """Where checkpoints go, and the one that is to `resume` or there: its render goes on.
+
+    OptionError for what won't do.
+    """
+    path, source = given["checkpoint"], given["resume"] if is_checkpoint(given["resume"]) else None
+    checkpoint = None
+    if path is not None:
+        check_file(path)
+        check_spares(path, scene.files)
+        checkpoint = Checkpoint(path, given["checkpoint_every"])
+        if os.path.lexists(path):
+            if source is not None and os.path.realpath(path) != os.path.realpath(source):
+                what = f"is there, and so is {source}: the render can go on from one of them"
+                raise OptionError(what, str(path), f"leave {option('resume')} out, or remove the file")
+            source = path
+    if source is None:
+        return checkpoint, None
+    saved = read_checkpoint(source)
+    check_count(saved, first, count)
+    return checkpoint, saved
 
 
 def check_same(before: Before, session: Session) -> None:

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
     from clvol.picture.tev import Tev
 
+THE_FIRST = ".exr"
+"""What --resume without a file stands for: that of the first picture that keeps its samples."""
 EXAMPLES = """
 \b
 Examples:
@@ -57,6 +59,7 @@ Examples:
   clvol render scenes/room.xml -o room.exr --profile --trace room.json
   clvol render scenes/cloud.xml -o cloud.exr --resume --spp 1024
   clvol render scenes/cloud.xml -o cloud.exr --spp 4096 --checkpoint cloud.npz
+  clvol render scenes/cloud.xml -o cloud.exr --spp 4096 --resume cloud.npz
 """
 
 
@@ -110,8 +113,11 @@ class RenderCommand(ExplainedCommand):
 )
 @click.option(
     "--resume",
-    is_flag=True,
-    help="Go on where the first .exr ended, if it is there: its samples count towards --spp.",
+    is_flag=False,
+    flag_value=THE_FIRST,
+    metavar="[FILE]",
+    help="Go on from a checkpoint, or where an .exr ended, whose samples count towards --spp; "
+    "without FILE from the first that is written, if it is there.",
 )
 @click.option(
     "--checkpoint",
@@ -195,9 +201,10 @@ def render(
     _take_checkpoint(options, frames is not None)
     read = {scene: "the scene"} | ({asked.given["light"]: "the light"} if asked.given.get("light") else {})
     _check_files(read, first, (options["checkpoint"], trace), shown, bool(options["aov"]))
-    resumes = options.pop("resume") or None
-    options["resume"] = resumes and _picture_to_go_on_from(outputs, frames is not None)
-    check_alone(options | extent | {"resume": resumes}, scene_chooses=not asked.is_volume)
+    resumes = options.pop("resume")
+    options["resume"] = resumes and _source(resumes, outputs, frames is not None)
+    goes_on = resumes == THE_FIRST or options["resume"]
+    check_alone(options | extent | {"resume": goes_on}, scene_chooses=not asked.is_volume)
     console, profiled = error_console(), options.pop("profile")
     options |= extent | {"profile": profiled or trace is not None}
     with logging_to(console, verbose), _tev_at(tev) as viewer:
@@ -240,10 +247,12 @@ def _take_checkpoint(options: dict[str, Any], series: bool) -> None:
     options["checkpoint_every"] = options["checkpoint_every"] or 60.0
 
 
-def _picture_to_go_on_from(outputs: Sequence[str], series: bool) -> str | None:
-    """The first output that has samples; None where it is not there yet."""
+def _source(given: str, outputs: Sequence[str], series: bool) -> str | None:
+    """The file that --resume names, else the first output that has samples, or None where it is not there."""
     if series:
         raise click.UsageError("--resume goes on with one picture; of frames, those that are there are kept")
+    if given != THE_FIRST:
+        return given
     first = next((output for output in outputs if output.lower().endswith(".exr")), None)
     if first is None:
         raise click.UsageError("--resume needs an .exr to go on from")

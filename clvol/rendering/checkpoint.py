@@ -13,6 +13,8 @@ import time
 import zipfile
 import zlib
 from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,14 +25,13 @@ from clvol.errors import OptionError, option
 from clvol.rendering.outcome import metadata_of, picture_names
 
 if TYPE_CHECKING:
-    from os import PathLike
-
     from clvol.rendering.session import Session
 
 log = logging.getLogger("clvol")
 
 FORMAT = 1
 _ABOUT = "about"
+_ARCHIVE = b"PK\x03\x04"
 _HINT = "give another name, or remove the file to begin anew"
 _DAMAGE = (
     *(OSError, EOFError, KeyError, TypeError, ValueError, AttributeError, MemoryError, SyntaxError),
@@ -123,6 +124,18 @@ def write_checkpoint(path: str | PathLike[str], session: Session, first: int, do
     text = np.frombuffer(json.dumps(about).encode(), np.uint8)
     with replacing(path) as file:
         np.savez(file, allow_pickle=False, **{_ABOUT: text}, **buffers)
+
+
+def is_checkpoint(given: object) -> bool:
+    """Whether what a render is to go on from is a checkpoint by its bytes, or no picture by its name."""
+    if not isinstance(given, str | PathLike):
+        return False
+    try:
+        with open_regular(given, OptionError, "checkpoint") as file:
+            archive = file.read(len(_ARCHIVE)) == _ARCHIVE
+    except OptionError:  # said when it is read
+        archive = False
+    return archive or Path(given).suffix.lower() != ".exr"
 
 
 def read_checkpoint(path: str | PathLike[str]) -> Saved:

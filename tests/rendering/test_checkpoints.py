@@ -49,6 +49,28 @@ def test_a_render_goes_on_to_the_same_bits(whole, tmp_path):
     assert result.metadata["seconds"] > 0
 
 
+def test_resume_takes_a_checkpoints_name(whole, tmp_path):
+    sampler, expected = whole
+    options = {"seed": SEED, "sampler": sampler, "aov": AOVS}
+    first, second = tmp_path / "a.npz", tmp_path / "b.npz"
+    clvol.render(scene(), spp=CUT, checkpoint=first, **options)
+    kept = first.read_bytes()
+    same(clvol.render(scene(), spp=SPP, resume=first, **options), expected)
+    assert first.read_bytes() == kept, "only what checkpoint= names is written"
+    same(clvol.render(scene(), spp=SPP, resume=str(first), checkpoint=second, **options), expected)
+    same(clvol.render(scene(), spp=SPP, resume=second, checkpoint=second, **options), expected)
+    *_, last = clvol.progressive(scene(), spp=SPP, resume=first, **options)
+    same(last, expected)
+    with pytest.raises(clvol.OptionError, match="the render can go on from one of them"):
+        clvol.render(scene(), spp=SPP, resume=first, checkpoint=second, **options)
+    with pytest.raises(clvol.OptionError, match="no such file"):
+        clvol.render(scene(), spp=SPP, resume=tmp_path / "c.npz", **options)
+    with pytest.raises(clvol.OptionError, match="another seed"):
+        clvol.render(scene(), spp=SPP, resume=first, **options | {"seed": SEED + 1})
+    with pytest.raises(clvol.OptionError, match="resume is for renders"):
+        clvol.render(scene(), resume=first, **options | {"target_error": 0.1})
+
+
 def test_ranges_of_samples_have_checkpoints_too(tmp_path):
     options = {"seed": SEED, "checkpoint": tmp_path / "a.npz"}
     clvol.render(scene(), samples=(8, 5), **options)
@@ -85,7 +107,7 @@ def test_checkpoints_are_written_on_the_way(tmp_path, monkeypatch):
         ({"aov": ["depth"]}, "with one with"),
         ({"spp": 3}, "has samples 0 to 3 of each pixel"),
         ({"samples": (1, 8)}, "has samples 0 to 3 of each pixel"),
-        ({"resume": "a.exr"}, "exclude each other"),
+        ({"resume": "a.exr"}, "a picture to resume exclude each other"),
         ({"target_error": 0.1}, "as many samples"),
         ({"technique": "auto:pilot"}, "may choose another"),
         ({"checkpoint_every": 0}, "seconds"),
