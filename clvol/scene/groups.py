@@ -44,6 +44,7 @@ def shapegroup(reader: Reader) -> ShapeGroup:
         log.warning(
             "%s: a shapegroup's to_world changes nothing, as in Mitsuba", reader.node.place("to_world")
         )
+    reader.ignore(silhouette_sampling_weight=float)
     found: list[Shape] = []
     for name, node in reader.children("shape"):
         if node.type == "instance":
@@ -57,6 +58,7 @@ def shapegroup(reader: Reader) -> ShapeGroup:
 
 def instance(reader: Reader) -> tuple[Shape, ...]:
     """The `instance` plugin: the shapes of a group under `to_world`, which may stretch and mirror them."""
+    reader.ignore(silhouette_sampling_weight=float)
     nodes = reader.children("shape")
     group = reader.build(nodes[0][1]) if len(nodes) == 1 else None
     if not isinstance(group, ShapeGroup):

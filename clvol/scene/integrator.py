@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+from clvol.errors import option
 from clvol.scene.records import Integrator
 
 if TYPE_CHECKING:
@@ -95,6 +96,8 @@ OTHERS: dict[str, Other] = {
 def volpath(reader: Reader) -> Chosen:
     """The `volpath` and `volpathmis` plugins, which have the same parameters and the same expectation."""
     choices = {name: reader.string(name, "") for name in CHOICES if reader.has(name)}
+    if reader.type == "volpathmis":
+        reader.ignore(use_spectral_mis=bool)
     return Chosen(_limits(reader, choices), True, reader.type)
 
 
@@ -108,7 +111,7 @@ def other(reader: Reader) -> Chosen:
     this = OTHERS[reader.type]
     reader.ignore(**this.ignored)
     if this.fixed:
-        reader.ignore(samples_per_pass=int, block_size=int)
+        _technical(reader)
         limits = Integrator(this.max_depth, hide_emitters=reader.boolean("hide_emitters", False))
     else:
         limits = _limits(reader, {}, this.max_depth)
@@ -161,6 +164,8 @@ def aov(reader: Reader) -> Chosen:
 
 
 def _inside(reader: Reader, optional: bool = False) -> Chosen:
+    _technical(reader)
+    reader.ignore(hide_emitters=bool)  # that of the one inside counts
     inner = reader.only_child("integrator")
     if inner is None and optional:
         return Chosen(Integrator())
@@ -172,10 +177,17 @@ def _inside(reader: Reader, optional: bool = False) -> Chosen:
 
 
 def _limits(reader: Reader, choices: dict[str, str], max_depth: int = -1) -> Integrator:
-    reader.ignore(samples_per_pass=int, block_size=int)
+    _technical(reader)
     return Integrator(
         max_depth=reader.integer("max_depth", max_depth, -1),
         rr_depth=reader.integer("rr_depth", 5, 1),
         hide_emitters=reader.boolean("hide_emitters", False),
         choices=choices,
     )
+
+
+def _technical(reader: Reader) -> None:
+    """How Mitsuba goes about its work, which changes no expectation; a limit of time is the order's."""
+    reader.ignore(samples_per_pass=int, block_size=int)
+    if reader.number("timeout", -1.0) > 0:
+        reader.approximated(f"no limit: {option('time', 60)} ends a render after a time", "timeout")

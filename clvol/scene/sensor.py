@@ -64,6 +64,7 @@ def _clip(reader: Reader) -> tuple[float, float]:
 
 def _sensor(reader: Reader, camera: Camera) -> Sensor:
     """`camera` with the film and sampler inside the sensor."""
+    _shutter(reader)
     film_node, sampler_node = reader.only_child("film"), reader.only_child("sampler")
     medium = reader.only_child("medium")
     return Sensor(
@@ -73,11 +74,19 @@ def _sensor(reader: Reader, camera: Camera) -> Sensor:
     )
 
 
+def _shutter(reader: Reader) -> None:
+    """Nothing moves, so that times of exposure change nothing; pictures have the colours of the eye."""
+    if reader.number("shutter_close", 0.0) < reader.number("shutter_open", 0.0):
+        reader.fail("shutter_close must not be before shutter_open", "shutter_close")
+    reader.refuse("srf", "pictures are linear sRGB")
+
+
 def batch(reader: Reader) -> tuple[Sensor, ...]:
     """The `batch` plugin: its sensors, each with a part of the film, which Mitsuba sets side by side.
 
     Their own films and samplers are superseded by those of the batch.
     """
+    _shutter(reader)
     found: list[Sensor] = [reader.build(node) for _, node in reader.children("sensor")]
     film_node, sampler_node = reader.only_child("film"), reader.only_child("sampler")
     film = reader.build(film_node) if film_node else Film()

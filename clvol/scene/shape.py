@@ -116,6 +116,7 @@ def _shape(reader: Reader, kind: str, to_world: np.ndarray, triangles: Mesh | No
         check_size(to_world)
     except SceneError as error:
         reader.fail(error.what, hint=error.hint)
+    reader.ignore(silhouette_sampling_weight=float)
     media = _media(reader)
     emission = _emission(reader)
     bsdf = reader.only_child("bsdf")

@@ -57,7 +57,7 @@ def gridvolume(reader: Reader) -> Volume:
     `to_world`; those of a .vdb or .nvdb file sit where a `vdbvolume` has them, and those of any other file
     that places its samples, as medical images do, where it says, under `to_world` as well.
     """
-    reader.ignore(accel=bool, raw=bool)
+    reader.ignore(accel=bool, raw=bool, max_value=float)  # majorants are worked out here
     wrap_mode = reader.string("wrap_mode", "clamp", WRAP_MODES)
     use_box = reader.boolean("use_grid_bbox", False)
     grid = _grid(reader)

@@ -51,7 +51,9 @@ LIMITS = {
     "hide_emitters": True,
     "samples_per_pass": Silent(4),
     "block_size": Silent(16),
+    "timeout": Silent(9.0),
 }
+SHUTTER = {"shutter_open": Silent(-1.0), "shutter_close": Silent(2.0)}
 CAMERA = {
     "to_world": MOVED,
     "fov": 30.0,
@@ -61,6 +63,7 @@ CAMERA = {
     "film": {"type": "hdrfilm", "width": 5},
     "sampler": {"type": "independent", "seed": 7},
     "medium": {"type": "homogeneous"},
+    **SHUTTER,
 }
 LIGHT = {"sampling_weight": Silent(2.0), "medium": Silent({"type": "homogeneous"})}
 SHAPE = {
@@ -70,6 +73,7 @@ SHAPE = {
     "emitter": {"type": "area"},
     "interior": {"type": "homogeneous"},
     "exterior": {"type": "homogeneous"},
+    "silhouette_sampling_weight": Silent(2.0),
 }
 MESH = SHAPE | {"face_normals": True}
 DIELECTRIC = {
@@ -107,7 +111,11 @@ MEDIUM = {
     "temperature_offset": -1.0,
 }
 SAMPLER = {"sample_count": 9, "seed": 9}
-INNER = {"inner": {"type": "path"}}, {"inner": {"type": "volpath", "max_depth": 2}}
+TECHNICAL = {name: LIMITS[name] for name in ("samples_per_pass", "block_size", "timeout")}
+INNER = (
+    {"inner": {"type": "path"}},
+    {"inner": {"type": "volpath", "max_depth": 2}, "hide_emitters": Silent(True), **TECHNICAL},
+)
 
 
 def silent(types):
@@ -125,7 +133,7 @@ UV = np.diag([2.0, 3.0, 1.0])
 
 PARAMETERS = {
     "volpath": ({}, LIMITS | CHOICES),
-    "volpathmis": ({}, LIMITS | CHOICES),
+    "volpathmis": ({}, LIMITS | CHOICES | {"use_spectral_mis": Silent(False)}),
     "path": ({}, LIMITS),
     "moment": INNER,
     "aov": (INNER[0], INNER[1] | {"aovs": Silent("d:depth")}),
@@ -143,7 +151,7 @@ PARAMETERS = {
     "orthographic": (
         {},
         {name: CAMERA[name] for name in ("near_clip", "far_clip", "film", "sampler", "medium")}
-        | {"to_world": np.diag([2.0, 1.0, 1.0, 1.0]), "focus_distance": Silent(2.0)},
+        | {"to_world": np.diag([2.0, 1.0, 1.0, 1.0]), "focus_distance": Silent(2.0), **SHUTTER},
     ),
     "batch": (
         {"inner": {"type": "perspective", "fov": 40.0}},
@@ -151,6 +159,7 @@ PARAMETERS = {
             "inner": {"type": "perspective", "fov": 50.0},
             "film": {"type": "hdrfilm", "width": 5},
             "sampler": {"type": "independent", "seed": 7},
+            **SHUTTER,
         },
     ),
     "hdrfilm": (
@@ -183,10 +192,17 @@ PARAMETERS = {
     "rectangle": ({}, SHAPE | {"face_normals": Silent(True)}),
     "disk": ({}, SHAPE),
     "cylinder": ({}, SHAPE | {"p0": [1, 2, 3], "p1": [1, 2, 3], "radius": 2.0}),
-    "shapegroup": ({"inner": {"type": "cube"}}, {"inner": {"type": "sphere"}, "to_world": Silent(MOVED)}),
+    "shapegroup": (
+        {"inner": {"type": "cube"}},
+        {"inner": {"type": "sphere"}, "to_world": Silent(MOVED), "silhouette_sampling_weight": Silent(2.0)},
+    ),
     "instance": (
         {"group": {"type": "shapegroup", "inner": {"type": "cube"}}},
-        {"group": {"type": "shapegroup", "inner": {"type": "sphere"}}, "to_world": MOVED},
+        {
+            "group": {"type": "shapegroup", "inner": {"type": "sphere"}},
+            "to_world": MOVED,
+            "silhouette_sampling_weight": Silent(2.0),
+        },
     ),
     "merge": ({"inner": {"type": "cube"}}, {"inner": {"type": "sphere"}}),
     "obj": ({"filename": "a.obj"}, MESH | {"filename": "b.obj", "flip_tex_coords": False}),
@@ -254,6 +270,7 @@ PARAMETERS = {
             "wrap_mode": "repeat",
             "accel": Silent(False),
             "raw": Silent(True),
+            "max_value": Silent(9.0),
             "sanitize": Silent(True),
         },
     ),
