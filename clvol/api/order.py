@@ -9,11 +9,13 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from clvol.api.extent import check_alone, sample_range
+from clvol.api.rescue import rescued
 from clvol.api.resuming import Before, check_same, checkpoint_of, resumable, what_is_left
 from clvol.base.arguments import check_seed, flag
 from clvol.base.progress import Glance, Progress
 from clvol.device.device import open_device
-from clvol.errors import OptionError, RenderError
+from clvol.device.driver import driver_errors
+from clvol.errors import DeviceError, OptionError, RenderError
 from clvol.picture.denoising import FEATURES, need_denoiser
 from clvol.picture.merging import merge
 from clvol.planning import registry
@@ -187,10 +189,20 @@ class Opened:
 
     def steps(self, callback: ProgressCallback | None, urgency: Callable[[], int]) -> Iterator[int]:
         """Render, and stop wherever the picture has more samples: at how many of each pixel, on the mean."""
+        done = 0
+        try:
+            for done in self._steps(callback, urgency):
+                yield done
+        except DeviceError as error:
+            order, picture = self.order, partial(self.result, done, final=False)
+            raise rescued(error, self.session, order.checkpoint, order.first, done, picture) from error
+
+    def _steps(self, callback: ProgressCallback | None, urgency: Callable[[], int]) -> Iterator[int]:
         order, session, target = self.order, self.session, self.order.choices.target_error
         if target is not None:
             render = TargetRender(session, target, order.spp)
-            yield from render.steps(order.time_limit, callback, urgency)
+            with driver_errors(session.device.description):
+                yield from render.steps(order.time_limit, callback, urgency)
             return
         had = 0 if order.resumed is None else order.resumed.samples[1]
         total = had + order.count if order.first + order.count < MAX_SAMPLES else None

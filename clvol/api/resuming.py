@@ -72,21 +72,21 @@ def checkpoint_of(
     OptionError for what won't do.
     """
     path, source = given["checkpoint"], given["resume"] if is_checkpoint(given["resume"]) else None
-    checkpoint = None
     if path is not None:
         check_file(path)
         check_spares(path, scene.files)
-        checkpoint = Checkpoint(path, given["checkpoint_every"])
         if os.path.lexists(path):
             if source is not None and os.path.realpath(path) != os.path.realpath(source):
                 what = f"is there, and so is {source}: the render can go on from one of them"
                 raise OptionError(what, str(path), f"leave {option('resume')} out, or remove the file")
             source = path
-    if source is None:
-        return checkpoint, None
-    saved = read_checkpoint(source)
-    check_count(saved, first, count)
-    return checkpoint, saved
+    saved = None if source is None else read_checkpoint(source)
+    if saved is not None:
+        check_count(saved, first, count)
+    if path is None:
+        return None, saved
+    written = saved.done if saved is not None and source == path else 0
+    return Checkpoint(path, given["checkpoint_every"], written), saved
 
 
 def check_same(before: Before, session: Session) -> None:

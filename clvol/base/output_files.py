@@ -129,11 +129,11 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
                 raise
 
 
-def kept_elsewhere(beside: StrPath, name: str, write: Callable[[Path], None]) -> Path | None:
+def kept_elsewhere(beside: StrPath | None, name: str, write: Callable[[Path], None]) -> Path | None:
     """Where `write` succeeded in leaving what could not be written as `beside`; None if nowhere.
 
-    Tried are the same folder, that for temporary files, the user's, and memory; `name` is unlike any other,
-    and `write` leaves nothing where it fails, with OSError or OptionError.
+    Tried are the same folder, if there is such, that for temporary files, the user's, and memory; `name` is
+    unlike any other, and `write` leaves nothing where it fails, with OSError or OptionError.
     """
     for folder in _refuges(beside):
         path = folder / name
@@ -145,8 +145,9 @@ def kept_elsewhere(beside: StrPath, name: str, write: Callable[[Path], None]) ->
     return None
 
 
-def _refuges(beside: StrPath) -> Iterator[Path]:
-    yield Path(os.path.realpath(beside)).parent
+def _refuges(beside: StrPath | None) -> Iterator[Path]:
+    if beside is not None:
+        yield Path(os.path.realpath(beside)).parent
     with suppress(OSError):  # there may be none that can be written to
         yield Path(tempfile.gettempdir())
     with suppress(RuntimeError):  # nor a home

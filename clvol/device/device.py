@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import pyopencl as cl
 
 from clvol.device import kernel_cache
+from clvol.device.driver import driver_errors
 from clvol.device.memory import DeviceMemory
 from clvol.errors import DeviceError, shown
 
@@ -181,8 +182,9 @@ def _open(index: int) -> Device:
     kernel_cache.open_call_cache()
     if _POCL in info.platform:
         _prepare_pocl()
-    context = cl.Context([device])
-    queue = cl.CommandQueue(context, properties=cl.command_queue_properties.PROFILING_ENABLE)
+    with driver_errors(info.name):
+        context = cl.Context([device])
+        queue = cl.CommandQueue(context, properties=cl.command_queue_properties.PROFILING_ENABLE)
     return Device(info, context, queue)
 
 

@@ -8,6 +8,7 @@ drivers' caches see exactly what is compiled.
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from functools import cache
 from importlib import resources
 from types import MappingProxyType
@@ -117,9 +118,11 @@ def build(device: Device, source: str, name: str) -> cl.Program:
     try:
         device.programs[source] = program.build(options=list(BUILD_OPTIONS))
         return device.programs[source]
-    except cl.RuntimeError as error:
-        info = cl.program_build_info.LOG
-        log = program.get_build_info(device.queue.device, info).strip() or str(error)
+    except cl.Error as error:
+        log, info = "", cl.program_build_info.LOG
+        with suppress(cl.Error):  # a device that is lost has no log
+            log = program.get_build_info(device.queue.device, info).strip()
+        log = log or str(error)
         raise DeviceError(f"kernel {name!r} does not build on {device.description}:\n{log}") from error
 
 

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from clvol.device.driver import driver_errors
 from clvol.device.programs import stage_source
 from clvol.errors import OptionError
 from clvol.lab.candidates import (
@@ -173,7 +174,8 @@ class Pilot:
             self.prepared[plan.needs] = prepare(self.small, plan), clock(self.device) - started
         prepared, seconds = self.prepared[plan.needs]
         started = clock(self.device)
-        session = Session.open(self.device, prepared.under(plan), 0)
+        with driver_errors(self.device.description):
+            session = Session.open(self.device, prepared.under(plan), 0)
         spent = clock(self.device) - started
         self.kernel_seconds += session.kernel_seconds
         seconds += spent * (1 - session.kernel_seconds / session.setup_seconds)

@@ -21,6 +21,7 @@ import numpy as np
 
 from clvol.base.files import open_regular
 from clvol.base.output_files import replacing
+from clvol.device.driver import driver_errors
 from clvol.errors import OptionError, option
 from clvol.rendering.outcome import metadata_of, picture_names
 
@@ -77,7 +78,8 @@ class Saved:
             )
         try:
             session.earlier = float(self.spent["seconds"])
-            wavefront.take_up(self.buffers, self.spent)
+            with driver_errors(session.device.description):
+                wavefront.take_up(self.buffers, self.spent)
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise OptionError(f"is damaged ({error!r})", self.path, _HINT) from None
 
@@ -89,21 +91,21 @@ class Checkpoint:
     ----------
     path : the file.
     every : seconds from one checkpoint to the next.
+    written : samples of each pixel that the file has.
     """
 
-    def __init__(self, path: str | PathLike[str], every: float) -> None:
-        self.path, self.every = path, every
+    def __init__(self, path: str | PathLike[str], every: float, written: int = 0) -> None:
+        self.path, self.every, self.written = path, every, written
         self._due = time.perf_counter() + every
-        self._written = 0
 
     def offer(self, session: Session, first: int, done: int, last: bool = False) -> None:
         """Write the file if it is time to, or this is the last chance; a disk that is full ends no render."""
         started = time.perf_counter()
-        if done == self._written or not (last or started >= self._due):
+        if done == self.written or not (last or started >= self._due):
             return
         try:
             write_checkpoint(self.path, session, first, done)
-            self._written = done
+            self.written = done
         except OptionError as error:
             log.warning("no checkpoint: %s", error)
         now = time.perf_counter()
@@ -112,15 +114,16 @@ class Checkpoint:
 
 def write_checkpoint(path: str | PathLike[str], session: Session, first: int, done: int) -> None:
     """The session's film, which has the samples `first` to `first + done`, as a file, whole or not at all."""
+    with driver_errors(session.device.description):
+        spent, buffers = session.wavefront.spent(), session.wavefront.film.contents()
     about = {
         "format": FORMAT,
         "first": first,
         "done": done,
         "pictures": picture_names(session.plan),
         "metadata": metadata_of(session, first, np.full(1, done)),
-        "spent": {"seconds": session.seconds, **session.wavefront.spent()},
+        "spent": {"seconds": session.seconds, **spent},
     }
-    buffers = session.wavefront.film.contents()
     text = np.frombuffer(json.dumps(about).encode(), np.uint8)
     with replacing(path) as file:
         np.savez(file, allow_pickle=False, **{_ABOUT: text}, **buffers)

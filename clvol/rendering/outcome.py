@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clvol import layout
+from clvol.device.driver import driver_errors
 from clvol.errors import Told, option
 from clvol.picture.result import Result, said_ranges
 from clvol.planning import registry
@@ -35,12 +36,13 @@ def make_result(session: Session, first: int, count: int, final: bool = True) ->
     film, window = session.wavefront.film, session.prepared.scene.film.window
     shape = window[3], window[2]
     estimate: Estimate
-    if session.plan.pixel_list:
-        estimate, samples = film.uneven_estimate(), film.samples
-    else:
-        estimate, samples = film.estimate(first, count), np.full(film.pixels, count)
-    stats = statistics(session, int(samples.sum()))
-    pictures = _pictures(session, samples, estimate)
+    with driver_errors(session.device.description):
+        if session.plan.pixel_list:
+            estimate, samples = film.uneven_estimate(), film.samples
+        else:
+            estimate, samples = film.estimate(first, count), np.full(film.pixels, count)
+        stats = statistics(session, int(samples.sum()))
+        pictures = _pictures(session, samples, estimate)
     aovs = {name: values.reshape(*shape, *values.shape[1:]) for name, values in pictures.items()}
     result = Result.from_estimate(
         estimate.reshaped(*shape, 3), (first, count), aovs, stats, metadata_of(session, first, samples)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 import pyopencl as cl
 
 from clvol.device import programs
+from clvol.device.driver import driver_errors
 from clvol.device.launch import run_kernel, scene_arguments
 from clvol.planning.plan import Plan
 from clvol.rendering.session import on_device, render_record
@@ -57,8 +58,9 @@ class SceneKernels:
     def upload(self, seed: int) -> None:
         """Write the prepared scene to the device (again)."""
         record = render_record(self.prepared, seed)
-        uploaded = self.device.memory.upload(record, "the camera")
-        self.buffers = upload_scene(self.device, self.prepared, record) | {"render": uploaded}
+        with driver_errors(self.device.description):
+            uploaded = self.device.memory.upload(record, "the camera")
+            self.buffers = upload_scene(self.device, self.prepared, record) | {"render": uploaded}
 
     def run_unit(
         self,
@@ -77,7 +79,8 @@ class SceneKernels:
         `scalars`.  `stage` is whose functions it calls, and whose contract holds.
         """
         source = programs.compose(self.plan, text, macros, stage)
-        kernel = cl.Kernel(programs.build(self.device, source, name), name)
-        unused = self.device.memory.allocate(4, "an argument", "")
-        resident = scene_arguments(self.plan.macros, self.buffers, slot_stride=1, unused=unused)
-        run_kernel(self.device, kernel, count, resident, inputs, outputs, scalars, purpose=self.purpose)
+        with driver_errors(self.device.description):
+            kernel = cl.Kernel(programs.build(self.device, source, name), name)
+            unused = self.device.memory.allocate(4, "an argument", "")
+            resident = scene_arguments(self.plan.macros, self.buffers, slot_stride=1, unused=unused)
+            run_kernel(self.device, kernel, count, resident, inputs, outputs, scalars, purpose=self.purpose)

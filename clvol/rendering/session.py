@@ -12,6 +12,7 @@ import numpy as np
 
 from clvol import layout
 from clvol.base.arguments import check_seed
+from clvol.device.driver import driver_errors
 from clvol.device.programs import build_stages, stage_units
 from clvol.device.side_builds import SideBuilds, Unit
 from clvol.errors import RenderError, option
@@ -91,7 +92,8 @@ class Session:
         with timed(profiler, "volumes and tables"):
             prepared = prepare(scene, plan)
         prepared_after = time.perf_counter() - started
-        session = cls.open(device, prepared, seed, pool, profiler)
+        with driver_errors(device.description):
+            session = cls.open(device, prepared, seed, pool, profiler)
         session.setup_seconds += spent + prepared_after
         return session
 
@@ -204,11 +206,12 @@ class Session:
         def should_stop() -> int:
             return max(interrupted(), time_limit is not None and spent() >= time_limit)
 
-        for done in self.wavefront.passes(first, count, should_stop):
-            self.seconds = self.earlier + spent()
-            left = time.perf_counter()
-            yield done
-            apart += time.perf_counter() - left
+        with driver_errors(self.device.description):
+            for done in self.wavefront.passes(first, count, should_stop):
+                self.seconds = self.earlier + spent()
+                left = time.perf_counter()
+                yield done
+                apart += time.perf_counter() - left
         if done == 0:
             raise nothing_finished(interrupted())
         self.seconds = self.earlier + spent()

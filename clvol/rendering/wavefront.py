@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import logging
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -251,7 +252,8 @@ class Wavefront:
                     return
         finally:
             if not idle:
-                self._abandon()
+                with suppress(cl.Error):  # a device that is lost has no paths
+                    self._abandon()
 
     def _out_of_patience(self, urgency: int, some_finished: bool) -> bool:
         """Whether paths in flight are no longer waited for."""
