@@ -1,6 +1,28 @@
-"""`python -m clvol` is the command `clvol`."""
+"""The command `clvol`, which `python -m clvol` is too: quiet at Ctrl-C before and after its work."""
 
-from clvol.cli.main import main
+import signal
+from typing import NoReturn
+
+
+def main() -> NoReturn:
+    """Run the command and exit.
+
+    While modules are loaded Ctrl-C ends the process at once, where Python would print what it was importing.
+    Once the work is done the exit status stands, and it is too late.
+    """
+    heeds = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    if heeds:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    from clvol.cli.main import main as command
+
+    if heeds:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        command(prog_name="clvol")
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    raise SystemExit
+
 
 if __name__ == "__main__":
-    main(prog_name="clvol")
+    main()

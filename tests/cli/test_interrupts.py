@@ -144,6 +144,39 @@ main(["render", "s.xml", "-o", "a.exr", "--spp", "1000000"])
 """
 
 
+LOADING = """
+import os, signal, sys
+module = sys.argv[-1]
+class Pressed:
+    def find_spec(self, name, path=None, target=None):
+        if name == module:
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Pressed())
+from clvol.__main__ import main
+sys.argv[1:] = ["--version"]
+main()
+"""
+EXITING = """
+import atexit, os, signal, sys
+from clvol.__main__ import main
+atexit.register(os.kill, os.getpid(), signal.SIGINT)
+sys.argv[1:] = ["--version"]
+main()
+"""
+
+
+def test_ctrl_c_says_nothing_while_the_command_is_loaded_or_has_ended() -> None:
+    """Python would print what it was importing, or doing at its exit."""
+
+    def run(*command: str) -> tuple[int, str]:
+        done = subprocess.run([sys.executable, "-c", *command], capture_output=True, text=True, check=False)
+        return done.returncode, done.stderr
+
+    for module in ("clvol.cli.main", "numpy", "clvol.cli.render"):
+        assert run(LOADING, module) == (-signal.SIGINT, "")
+    assert run(EXITING) == (0, "")
+
+
 def test_an_ignored_ctrl_c_takes_no_other_signal_with_it(tmp_path: Path) -> None:
     """As a shell's background jobs ignore it; the compiler of kernels has caught it by the first sample."""
     (tmp_path / "s.xml").write_text(SCENE)
