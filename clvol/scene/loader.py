@@ -27,6 +27,7 @@ from clvol.scene import (
 from clvol.scene.building import build, build_whole
 from clvol.scene.faults import MOST_SKIPPED, EnoughError, Faults, LostError, UnsupportedError
 from clvol.scene.library import Grids, Library, PluginTable
+from clvol.scene.mesh_attributes import mesh_attribute
 from clvol.scene.mesh_files import FORMATS
 from clvol.scene.nodes import Node, from_dict
 from clvol.scene.pbrt.translation import is_pbrt, read_pbrt
@@ -74,6 +75,7 @@ PLUGINS: PluginTable = {
         "disk": shape.disk,
         "cylinder": shape.cylinder,
         **dict.fromkeys(FORMATS, shape.mesh),
+        "mesh": shape.mesh_of_arrays,
         "shapegroup": groups.shapegroup,
         "instance": groups.instance,
         "merge": groups.merge,
@@ -118,7 +120,12 @@ PLUGINS: PluginTable = {
         "spot": emitter.spot,
         "area": emitter.area,
     },
-    "texture": {**SPECTRA, "bitmap": texture.bitmap, "checkerboard": texture.checkerboard},
+    "texture": {
+        **SPECTRA,
+        "bitmap": texture.bitmap,
+        "checkerboard": texture.checkerboard,
+        "mesh_attribute": mesh_attribute,
+    },
 }
 """Kind -> plugin name -> the function that builds its record."""
 

@@ -40,6 +40,15 @@ class Checkerboard:
     to_uv: np.ndarray = field(default_factory=lambda: np.eye(3))
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class MeshAttribute(Bitmap):
+    """The attribute `name` of a mesh, times `scale`: in shapes the picture made of it has its place."""
+
+    pixels: np.ndarray = field(default_factory=lambda: np.zeros((1, 1, 3), np.float32))
+    name: str = ""
+    scale: float = 1.0
+
+
 Texture = Spectrum | Bitmap | Checkerboard
 """A colour everywhere the same, or one over (u, v)."""
 

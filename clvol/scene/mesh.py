@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from clvol.scene.records import Mesh
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
 log = logging.getLogger("clvol")
 
@@ -28,6 +28,7 @@ class RawMesh:
 
     without_uvs : bool (n,), the vertices that have no texture coordinates though others do; None: all have.
     Normals of length 0 are worked out.
+    attributes : of vertices or faces, (n or m, 1 or 3), by names like vertex_color and face_color.
     """
 
     vertices: np.ndarray
@@ -35,6 +36,7 @@ class RawMesh:
     normals: np.ndarray | None = None
     uvs: np.ndarray | None = None
     without_uvs: np.ndarray | None = None
+    attributes: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
 def build_mesh(raw: RawMesh, source: str, smooth: bool) -> tuple[Mesh, np.ndarray]:
@@ -60,13 +62,26 @@ def build_mesh(raw: RawMesh, source: str, smooth: bool) -> tuple[Mesh, np.ndarra
     with np.errstate(over="ignore"):
         local = np.ascontiguousarray(vertices - origin, dtype=np.float32)
     _check_finite(local, "vertex")
-    faces = _with_area(local, np.ascontiguousarray(faces, dtype=np.int32), source)
-    faces = _once(local, faces, source)
+    faces = np.ascontiguousarray(faces, dtype=np.int32)
+    with_area = _with_area(local, faces, source)
+    once = _once(local, faces[with_area], source)
+    faces = faces[with_area][once]
+    attributes = {
+        name: _attribute(name, values[with_area][once] if name.startswith("face_") else values)
+        for name, values in raw.attributes.items()
+    }
     uvs = None if raw.uvs is None else np.ascontiguousarray(raw.uvs, dtype=np.float32)
     if uvs is not None:
         _check_finite(uvs, "texture coordinate")
     normals = _normals(local, faces, raw.normals) if smooth else None
-    return Mesh(local, faces, normals, uvs, source), origin
+    return Mesh(local, faces, normals, uvs, source, attributes), origin
+
+
+def _attribute(name: str, values: np.ndarray) -> np.ndarray:
+    with np.errstate(over="ignore"):
+        made = np.ascontiguousarray(values, dtype=np.float32)
+    _check_finite(made, f"{name} number")
+    return made
 
 
 def _check_finite(values: np.ndarray, what: str) -> None:
@@ -97,19 +112,19 @@ def _cross(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return np.cross(b - a, c - a)
 
 
-def _with_area(vertices: np.ndarray, faces: np.ndarray, source: str) -> np.ndarray:
+def _with_area(vertices: np.ndarray, faces: np.ndarray, source: str) -> np.ndarray | slice:
+    """The faces that have an area."""
     kept = np.concatenate([_cross(vertices, faces[part]).any(axis=1) for part in _chunks(len(faces))])
     if kept.all():
-        return faces
+        return slice(None)
     if not kept.any():
         raise ValueError("none of its triangles has an area")
     log.warning("%s: %d of %d triangles have no area and are left out", source, (~kept).sum(), len(faces))
-    left: np.ndarray = faces[kept]
-    return left
+    return kept
 
 
-def _once(vertices: np.ndarray, faces: np.ndarray, source: str) -> np.ndarray:
-    """Faces without those that lie where another does, turned the same way: light would pass them twice.
+def _once(vertices: np.ndarray, faces: np.ndarray, source: str) -> np.ndarray | slice:
+    """The faces but those that lie where another does, turned alike: light would pass them twice.
 
     Looked for among those alone whose vertices' places have the same sum, mixed to 64 bits.
     """
@@ -117,7 +132,7 @@ def _once(vertices: np.ndarray, faces: np.ndarray, source: str) -> np.ndarray:
     ordered = np.sort(sums)
     twice = np.unique(ordered[1:][ordered[1:] == ordered[:-1]])
     if not len(twice):
-        return faces
+        return slice(None)
     candidates = np.flatnonzero(np.isin(sums, twice))
     corners = merged_vertices(vertices[faces[candidates].reshape(-1)]).reshape(-1, 3)
     least = corners.argmin(axis=1)
@@ -125,9 +140,9 @@ def _once(vertices: np.ndarray, faces: np.ndarray, source: str) -> np.ndarray:
     first = np.unique(rows, axis=0, return_index=True)[1]
     extra = np.delete(candidates, first)
     if not len(extra):
-        return faces
+        return slice(None)
     log.warning("%s: %d of %d triangles are there twice and left out", source, len(extra), len(faces))
-    return np.delete(faces, extra, axis=0)
+    return np.delete(np.arange(len(faces)), extra)
 
 
 def _place_sums(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from clvol.errors import SceneError, shown
+from clvol.scene.loaded_meshes import dict_of_loaded_mesh, is_loaded_mesh
 
 MAX_DEPTH = 64
 """Deepest nesting accepted: far beyond any scene, well within Python's recursion limit."""
@@ -120,7 +121,9 @@ def from_dict(source: Mapping[str, object], where: str = "scene", depth: int = 0
         if key == "id" and source["type"] != "ref":
             continue
         path = f"{where}.{key}"
-        if _is_loaded(value):
+        if is_loaded_mesh(value):
+            value = dict_of_loaded_mesh(value, path)
+        elif _is_loaded(value):
             what = f"a Mitsuba {type(value).__name__} that is loaded already tells too little of itself"
             raise SceneError(what, path, "give the dict that mi.load_dict made it from")
         node.add(key, from_dict(value, path, depth + 1) if isinstance(value, Mapping) else value, path)

@@ -86,6 +86,7 @@ RULES: dict[tuple[str, str], Rule] = {
     ("texture", "bitmap"): _BITMAP,
     ("texture", "ldrtexture"): Rule("bitmap", values=_BITMAP.values),
     ("texture", "exrtexture"): Rule("bitmap", values=_BITMAP.values),
+    ("texture", "vertexcolors"): Rule("mesh_attribute", added=(("string", "name", "vertex_color"),)),
     ("texture", "checkerboard"): Rule(renamed={"bright_color": "color0", "dark_color": "color1"}),
     ("medium", "homogeneous"): Rule(dropped=("strategy", "sampling_weight", "medium_sampling_weight")),
     ("medium", "heterogeneous"): Rule(

@@ -23,6 +23,7 @@ _FORMATS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": "="}
 _UVS = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"))
 _INDICES = ("vertex_indices", "vertex_index")
 _CORNER_UVS = "texcoord"
+_ENDINGS = "01234xyzwrgba"
 _NO_INDEX = 2**62
 """What indices beyond any table become."""
 
@@ -51,7 +52,7 @@ _Columns = dict[str, np.ndarray | _Lists]
 
 
 def read_ply(data: bytes) -> RawMesh:
-    """Positions, faces (polygons as triangles), normals and texture coordinates of a PLY file.
+    """Positions, faces (polygons as triangles), normals, texture coordinates and attributes of a PLY file.
 
     Texture coordinates may be the vertices' (u, v; s, t; texture_u, texture_v) or the corners' (texcoord).
 
@@ -79,7 +80,8 @@ def read_ply(data: bytes) -> RawMesh:
         raise ValueError("it has no triangles")
     uvs = next((uv for names in _UVS if (uv := _columns(vertices, names)) is not None), None)
     normals = _columns(vertices, ("nx", "ny", "nz"))
-    return _assemble(positions, normals, uvs, polygons, faces.get(_CORNER_UVS))
+    of_vertices, of_faces = attributes_of(vertices, "vertex"), attributes_of(faces, "face")
+    return _assemble(positions, normals, uvs, polygons, faces.get(_CORNER_UVS), of_vertices, of_faces)
 
 
 def _assemble(
@@ -88,6 +90,8 @@ def _assemble(
     uvs: np.ndarray | None,
     polygons: _Lists,
     corner_uvs: np.ndarray | _Lists | None,
+    of_vertices: dict[str, np.ndarray],
+    of_faces: dict[str, np.ndarray],
 ) -> RawMesh:
     sizes, corners = polygons.sizes, polygons.values
     if corners.dtype.kind == "f":
@@ -99,8 +103,10 @@ def _assemble(
     if wrong.any():
         raise ValueError(f"a triangle names vertex {corners[wrong.argmax()]} of {len(positions)}")
     triangles = triangulate(positions[corners] if (sizes > 3).any() else positions[:0], sizes)
+    polygon = np.repeat(np.arange(len(sizes)), sizes)[triangles[:, 0]] if of_faces else None
+    of_faces = {name: values[polygon] for name, values in of_faces.items()}
     if uvs is not None or not isinstance(corner_uvs, _Lists):
-        return RawMesh(positions, corners[triangles], normals, uvs)
+        return RawMesh(positions, corners[triangles], normals, uvs, attributes=of_vertices | of_faces)
     named = corner_uvs.sizes == 2 * sizes
     if not (named | (corner_uvs.sizes == 0)).all():
         raise ValueError(f"a face whose {_CORNER_UVS} are not two numbers a corner")
@@ -118,7 +124,28 @@ def _assemble(
         None if normals is None else normals[used],
         of_corners[first] if named.any() else None,
         ~has[first] if named.any() and not named.all() else None,
+        {name: values[used] for name, values in of_vertices.items()} | of_faces,
     )
+
+
+def attributes_of(rows: _Columns, kind: str) -> dict[str, np.ndarray]:
+    """What else the rows of vertices or faces hold, as Mitsuba names it: numbers (n, 1) or (n, 3) each.
+
+    red, green and blue, or r, g and b, are vertex_color; what ends in _0, _1 and _2 or in _x, _y and _z has
+    the name before, and what ends in _r, _g and _b has "_color" after it.  One number may stand alone.
+    """
+    found: dict[str, list[str]] = {}
+    for names in (("red", "green", "blue"), ("r", "g", "b")):
+        if all(isinstance(rows.get(name), np.ndarray) for name in names):
+            found[f"{kind}_color"] = list(names)
+    for name, column in rows.items():
+        before, _, after = name.rpartition("_")
+        if before and len(after) == 1 and after in _ENDINGS and isinstance(column, np.ndarray):
+            key = f"{kind}_{before}" + ("_color" if after in "rgba" else "")
+            found.setdefault(key, []).append(name)
+    kept = {key: names for key, names in found.items() if len(names) in (1, 3)}
+    columns = {key: _columns(rows, tuple(names)) for key, names in kept.items()}
+    return {key: values for key, values in columns.items() if values is not None}
 
 
 def _header(data: bytes) -> tuple[str, list[_Element], bytes]:

@@ -16,7 +16,7 @@ from clvol.scene.kept import Kept
 from clvol.scene.materials import Bsdf, Null
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from numpy.typing import ArrayLike
 
@@ -265,6 +265,7 @@ class Mesh:
 
     vertices : float32 (n, 3).  faces : int32 (m, 3), counter-clockwise seen from outside.
     normals : float32 (n, 3), unit, of smooth shading; None: the faces' own.  uvs : float32 (n, 2), or None.
+    attributes : float32 (n or m, 1 or 3) of vertices or faces, by name; shapes have pictures of them instead.
     """
 
     vertices: np.ndarray
@@ -272,6 +273,7 @@ class Mesh:
     normals: np.ndarray | None = None
     uvs: np.ndarray | None = None
     source: str = ""
+    attributes: Mapping[str, np.ndarray] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
         return f"<Mesh {self.source}: {len(self.vertices)} vertices, {len(self.faces)} triangles>"

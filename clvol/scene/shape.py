@@ -12,11 +12,14 @@ from clvol.scene.emitter import AreaLight
 from clvol.scene.files import find_parameter
 from clvol.scene.material_facts import has_textures
 from clvol.scene.materials import Diffuse
+from clvol.scene.mesh_arrays import read_arrays
+from clvol.scene.mesh_attributes import with_attributes
 from clvol.scene.mesh_files import read_mesh
 from clvol.scene.records import Medium, Mesh, Shape
 from clvol.scene.transforms import check_size, frame, keeps_angles, scale, translate
 
 if TYPE_CHECKING:
+    from clvol.scene.materials import Bsdf
     from clvol.scene.reader import Reader
 
 log = logging.getLogger("clvol")
@@ -100,6 +103,12 @@ def mesh(reader: Reader) -> Shape:
     return _shape(reader, "mesh", reader.transform() @ translate(origin), read)
 
 
+def mesh_of_arrays(reader: Reader) -> Shape:
+    """Our `mesh` plugin: vertices and faces as arrays, by the names that Mitsuba's meshes have for them."""
+    read, origin = read_arrays(reader)
+    return _shape(reader, "mesh", reader.transform() @ translate(origin), read)
+
+
 def trianglemesh(reader: Reader) -> Shape:
     """The `trianglemesh` plugin, for readers of other formats: a `Mesh` that is made already, as `mesh`."""
     made = reader.raw("mesh")
@@ -127,12 +136,14 @@ def _shape(reader: Reader, kind: str, to_world: np.ndarray, triangles: Mesh | No
             'add <bsdf type="null"/> to look into it',
             reader.node.where,
         )
+    made_of: Bsdf = reader.build(bsdf) if bsdf else Diffuse((0.0,) if emission else (0.5,))
+    made_of, triangles = with_attributes(reader, made_of, triangles)
     made = Shape(
         kind,
         to_world,
         interior=media.get("interior"),
         exterior=media.get("exterior"),
-        bsdf=reader.build(bsdf) if bsdf else Diffuse((0.0,) if emission else (0.5,)),
+        bsdf=made_of,
         emission=emission,
         flip_normals=reader.boolean("flip_normals", False),
         mesh=triangles,

@@ -19,7 +19,7 @@ LATER: dict[str, tuple[str, ...]] = {
     "sensor": ("radiancemeter", "irradiancemeter", "distant"),
     "film": ("specfilm",),
     "shape": (
-        *("mesh", "bsplinecurve", "linearcurve", "sdfgrid"),
+        *("bsplinecurve", "linearcurve", "sdfgrid"),
         *("ellipsoids", "heightfield"),
     ),
     "bsdf": (
@@ -28,7 +28,7 @@ LATER: dict[str, tuple[str, ...]] = {
     ),
     "phase": ("sggx",),
     "emitter": ("projector", "directionalarea", "sunsky"),
-    "texture": ("mesh_attribute", "volume"),
+    "texture": ("volume",),
 }
 """Kind -> plugins known by name and not supported in this version."""
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio  # noqa: N813
+import trimesh
 from mesh_files import ascii_ply, serialized, serialized_mesh
 
 from clvol.volumes import write_vol
@@ -29,6 +30,7 @@ def write_files(folder):
     write_vol(folder / "albedo.vol", rng.uniform(0.4, 1, (4, 4, 4, 3)).astype(np.float32), unit)
     write_vol(folder / "colours.vol", rng.uniform(0, 1, (3, 4, 5, 3)).astype(np.float32), unit)
     (folder / "smooth.ply").write_bytes(_smooth_ply())
+    (folder / "painted.ply").write_bytes(_painted_ply())
     (folder / "cup.obj").write_text(_cup_obj())
     (folder / "pair.serialized").write_bytes(_pair())
     for scene in SCENES:
@@ -67,6 +69,13 @@ def _smooth_ply(rings=6, sectors=9):
     faces = np.concatenate([upper.reshape(-1, 3), lower.reshape(-1, 3)])
     rows = np.concatenate([normals, normals, uvs], axis=-1).reshape(-1, 8)
     return ascii_ply(rows, faces, ("x", "y", "z", "nx", "ny", "nz", "u", "v"))
+
+
+def _painted_ply():
+    """A ball of few faces, whose vertices have colours, and a number as an attribute."""
+    ball, rng = trimesh.creation.icosphere(1), np.random.default_rng(2)
+    rows = np.concatenate([ball.vertices, rng.uniform(0.05, 0.5, (len(ball.vertices), 4))], axis=1)
+    return ascii_ply(rows, ball.faces, ("x", "y", "z", "red", "green", "blue", "rough_0"))
 
 
 def _cup_obj(sectors=7):

@@ -13,6 +13,8 @@ from clvol.scene.sensor import OTHER_SAMPLERS
 RGB = {"type": "rgb", "value": [0.1, 0.2, 0.3]}
 TEXELS = np.linspace(0, 1, 12, dtype=np.float32).reshape(2, 2, 3)
 SKY = np.linspace(0, 1, 36, dtype=np.float32).reshape(3, 4, 3)
+CORNERS = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
+FACES = np.array([(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)])
 CELLS = np.linspace(0, 1, 8).reshape(2, 2, 2)
 TEXTURE = {"type": "bitmap", "bitmap": TEXELS}
 VOLUME = {"type": "gridvolume", "data": CELLS}
@@ -74,6 +76,7 @@ SHAPE = {
     "interior": {"type": "homogeneous"},
     "exterior": {"type": "homogeneous"},
     "silhouette_sampling_weight": Silent(2.0),
+    "vertex_a": Silent(TEXTURE),  # for mesh_attribute textures
 }
 MESH = SHAPE | {"face_normals": True}
 DIELECTRIC = {
@@ -214,6 +217,12 @@ PARAMETERS = {
     "stl": ({"filename": "a.stl"}, MESH | {"filename": "b.stl", "face_normals": Silent(True)}),
     "glb": ({"filename": "a.glb"}, MESH | {"filename": "b.glb", "flip_tex_coords": Silent(False)}),
     "gltf": ({"filename": "a.gltf"}, MESH | {"filename": "b.gltf", "flip_tex_coords": Silent(False)}),
+    "mesh": (
+        {"vertex_positions": CORNERS, "faces": FACES},
+        MESH
+        | {"vertex_positions": 2 * CORNERS, "faces": FACES[:2]}
+        | {"vertex_normals": CORNERS + 1, "vertex_texcoords": CORNERS[:, :2]},
+    ),
     "null": ({}, {}),
     "diffuse": ({}, {"reflectance": TEXTURE}),
     "dielectric": ({}, DIELECTRIC),
@@ -328,6 +337,7 @@ PARAMETERS = {
             "format": Silent("fp16"),
         },
     ),
+    "mesh_attribute": ({"name": "vertex_a"}, {"name": "face_a", "scale": 0.5}),
     "checkerboard": ({}, {"color0": RGB, "color1": RGB, "to_uv": UV}),
 }
 INSTEAD = {

@@ -12,7 +12,7 @@ import OpenImageIO as oiio  # noqa: N813
 import pytest
 import trimesh
 from mesh_files import serialized, serialized_mesh
-from plugin_parameters import CELLS, INSTEAD, PARAMETERS, RGB, SKY, Silent
+from plugin_parameters import CELLS, CORNERS, FACES, INSTEAD, PARAMETERS, RGB, SKY, Silent
 from vdb_writer import GridSpec, write_vdb
 
 from clvol.errors import Error
@@ -73,6 +73,15 @@ def files(tmp_path_factory):
         yield
 
 
+PAINTED = {
+    "type": "mesh",
+    "vertex_positions": CORNERS,
+    "faces": FACES,
+    "vertex_a": np.linspace(0, 1, 4),
+    "face_a": np.linspace(0, 1, 4),
+}
+
+
 def scene_of(plugin):
     """A scene that a plugin stands in where its kind belongs."""
     kind, light = KIND_OF[plugin["type"]], {}
@@ -84,7 +93,8 @@ def scene_of(plugin):
     inside = {"film": plugin if kind == "film" else film} | ({"sampler": plugin} if kind == "sampler" else {})
     sensor = plugin if kind == "sensor" else {"type": "perspective", "fov": 40.0, **inside}
     texture = {"type": "diffuse", "reflectance": plugin} if kind == "texture" else {"type": "diffuse"}
-    wall = {"type": "rectangle", "bsdf": plugin if kind == "bsdf" else texture}
+    wall = PAINTED if plugin["type"] == "mesh_attribute" else {"type": "rectangle"}
+    wall = wall | {"bsdf": plugin if kind == "bsdf" else texture}
     if plugin["type"] == "area":
         wall["emitter"] = plugin
     medium = {"type": "heterogeneous"}

@@ -38,6 +38,7 @@ PICTURES = {
     "glass": ("glass", {}, 32, 1024),
     "meshes": ("meshes", {}, 32, 4096),
     "shapes": ("shapes", {}, 64, 4096),
+    "attributes": ("attributes", {}, 64, 1024),
     "lamps": ("lamps", {}, 64, 2048),
     "fog": ("fog", {}, 96, 4096),
     "cloud": ("cloud", {}, 24, 1024),
@@ -150,5 +151,5 @@ def test_the_scenes_have_every_plugin_that_both_programs_know():
     taken_as_others = {*integrator.OTHERS, *integrator.WRAPPERS, *sensor.OTHER_SAMPLERS, "aov", "batch"}
     known = {name for plugins in PLUGINS.values() for name in plugins}
     not_in_rgb = {"regular", "irregular", "blackbody"}  # Mitsuba's rgb variants do not take them
-    own = {"classified", "vdbvolume", "stl", "glb", "gltf"}
+    own = {"classified", "vdbvolume", "stl", "glb", "gltf", "mesh"}
     assert known - used - taken_as_others - not_in_rgb == own
