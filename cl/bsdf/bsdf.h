@@ -2,9 +2,10 @@
 
    CLVOL_BSDF_<kind> is 1 for those; of the others nothing is compiled.  A mask is the `opacity` of a material, which
    the caller decides first; all here is what is left of the surface then.  One-sided kinds reflect on the side of +z
-   alone: the caller picks the side's material and turns z (material_transmits). */
+   alone: the caller picks the side's material and turns z (material_transmits), and of a mixture one part before. */
 #ifndef CLVOL_BSDF_BSDF_H
 #define CLVOL_BSDF_BSDF_H
+#include "bsdf/blend.h"
 #include "bsdf/conductor.h"
 #include "bsdf/dielectric.h"
 #include "bsdf/diffuse.h"
@@ -38,6 +39,28 @@ INLINE Spectrum null_transmission(const Scene *scene, __global const Material *m
 #endif
     return (Spectrum)(1.0f - opacity);
 }
+
+#if CLVOL_BSDF_BLEND
+/* The same, on the mean over the parts of a mixture. */
+INLINE Spectrum mean_transmission(const Scene *scene, __global const Material *material, float2 uv, float cos_i,
+                                  int channel)
+{
+    if (!IS_BSDF(material, BLEND))
+        return null_transmission(scene, material, uv, cos_i, channel);
+    Spectrum sum = (Spectrum)(0.0f);
+    __global const float *entry = scene->material_tables + material->table;
+    for (int left = (int)*entry++; left > 0; --left) {
+        int number;
+        const float share = blend_part(scene, &entry, uv, &number);
+        if (number >= 0)
+            sum += share * null_transmission(scene, scene->materials + number, uv, cos_i, channel);
+    }
+    return sum;
+}
+#define STRAIGHT_TRANSMISSION mean_transmission
+#else
+#define STRAIGHT_TRANSMISSION null_transmission
+#endif
 
 /* f |cos theta_o| and the pdf, in solid angle, with which bsdf_sample draws wo; 0 and 0 for delta lobes. */
 INLINE Spectrum bsdf_value(const Scene *scene, __global const Material *material, float2 uv, float3 wi, float3 wo,

@@ -116,7 +116,7 @@ INLINE Spectrum shadow_share(const Scene *scene, uint slot, Tally *tally)
             Side side;
             if (!side_of(scene, scene->shapes + surface.shape, wi, &side))
                 return (Spectrum)(0.0f);
-            through = null_transmission(scene, side.material, surface.uv, wi.z, channel);
+            through = STRAIGHT_TRANSMISSION(scene, side.material, surface.uv, wi.z, channel);
             if (!(spectrum_max(share * through) > 0.0f))
                 return share * through;
         }

@@ -24,6 +24,21 @@ INLINE bool side_of(const Scene *scene, __global const Shape *shape, float3 wi, 
     return true;
 }
 
+#if CLVOL_BSDF_BLEND
+/* Of a mixture one part by chance, which leaves `pick` uniform; false where that is black. */
+INLINE bool choose_side(const Scene *scene, float2 uv, float3 wi, float *pick, Side *side)
+{
+    if (!IS_BSDF(side->material, BLEND))
+        return true;
+    const int number = choose_part(scene, side->material, uv, pick);
+    if (number < 0)
+        return false;
+    side->material = scene->materials + number;
+    side->side = wi.z < 0.0f && !material_transmits(side->material) ? -1.0f : 1.0f;
+    return true;
+}
+#endif
+
 INLINE float3 on_side(const Side *side, float3 d) { return (float3)(d.x, d.y, side->side * d.z); }
 
 #endif

@@ -141,6 +141,14 @@ INLINE bool shade_surface(const Scene *scene, uint slot, const Draws *draws, boo
     if (!side_of(scene, shape, wi, &side))
         return false;
     const uint4 k = drawn_block(scene, draws, BLOCK_SURFACE);
+#if CLVOL_BSDF_BLEND
+    float pick = uniform_float(k.w);
+    if (!choose_side(scene, surface.uv, wi, &pick, &side))
+        return false;
+#define PICK pick
+#else
+#define PICK uniform_float(k.w)
+#endif
 #if CLVOL_HAS_PASSABLE
     if (side.material->kind == MATERIAL_NULL)
         return pass_on(scene, slot, ray, &hit, &surface);
@@ -152,8 +160,7 @@ INLINE bool shade_surface(const Scene *scene, uint slot, const Draws *draws, boo
     BsdfSample sample;
     Spectrum beta = path_beta(scene, slot);
     const bool sampled = bsdf_sample(scene, side.material, surface.uv, on_side(&side, wi), uniform_below_one(k.y),
-                                     uniform_below_one(k.z), uniform_float(k.w), (int)path_channel(scene, slot),
-                                     &sample);
+                                     uniform_below_one(k.z), PICK, (int)path_channel(scene, slot), &sample);
 #if CLVOL_HAS_PASSABLE
     if (sampled && sample.passes) {
         set_path_beta(scene, slot, beta * sample.weight);

@@ -30,8 +30,10 @@ BSDF_FACTS = {
     "PRINCIPLED": BsdfFacts(),
     "PRINCIPLED_GLASS": BsdfFacts(transmits=True),
     "PRINCIPLED_THIN": BsdfFacts(transmits=True),
+    "BLEND": BsdfFacts(smooth=True),
 }
-"""By name; masks and two-sided ones have none of their own.  Principled ones that transmit are of glass."""
+"""By name; masks and two-sided ones have none of their own, and a blend has the lobes of what it holds alone.
+Principled ones that transmit are of glass."""
 
 BSDFS = tuple(BSDF_FACTS)
 """In the order of their numbers on the device."""

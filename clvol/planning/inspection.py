@@ -10,7 +10,6 @@ from clvol.scene import records
 from clvol.scene.boundaries import Boundaries, camera_may_be_inside, is_clipped, may_overlap
 from clvol.scene.material_facts import (
     bsdf_kinds,
-    bsdf_sides,
     bsdf_textures,
     has_bitmaps,
     has_rough_textures,
@@ -33,6 +32,7 @@ from clvol.scene.medium_facts import (
 )
 from clvol.scene.phase import phase_lobes
 from clvol.scene.primitives import QUADRICS, mesh_of
+from clvol.scene.sides import bsdf_parts
 from clvol.scene.thinness import thin_media
 
 if TYPE_CHECKING:
@@ -165,7 +165,7 @@ def _light_features(
 
 def _turns(bsdf: Bsdf) -> bool:
     """Whether the direction of its tangents matters."""
-    sides = [side.bsdf for side in bsdf_sides(bsdf) if side is not None]
+    sides = [side.bsdf for side in bsdf_parts(bsdf)]
     return any(getattr(b, "alpha_u", 0) != getattr(b, "alpha_v", 0) for b in sides)
 
 

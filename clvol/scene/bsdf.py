@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from clvol.scene.material_facts import is_transmissive
+from clvol.scene.material_facts import is_transmissive, passes_light
 from clvol.scene.materials import (
-    Bitmap,
+    Blend,
     Bsdf,
-    Checkerboard,
     Conductor,
     Dielectric,
     Diffuse,
@@ -27,7 +26,8 @@ from clvol.scene.materials import (
     TwoSided,
 )
 from clvol.scene.refraction import INDICES, METALS
-from clvol.scene.texture import constant, roughness, texture
+from clvol.scene.sides import MAX_PARTS, count_parts
+from clvol.scene.texture import constant, roughness, share, texture
 from clvol.scene.vocabulary import did_you_mean, join_hints, listed
 
 if TYPE_CHECKING:
@@ -159,7 +159,7 @@ def twosided(reader: Reader) -> TwoSided:
     """The `twosided` plugin: one BSDF for both sides, or the front's and the back's in the order given."""
     found = _nested(reader, most=2)
     for name, bsdf in found:
-        if isinstance(bsdf, Null | Dielectric | Mask) or is_transmissive(bsdf):
+        if isinstance(bsdf, Mask) or passes_light(bsdf) or is_transmissive(bsdf):
             reader.fail(
                 "a twosided BSDF takes no BSDF that light passes",
                 name,
@@ -171,18 +171,21 @@ def twosided(reader: Reader) -> TwoSided:
 def mask(reader: Reader) -> Mask:
     """The `mask` plugin: `opacity` 1 shows the nested BSDF, 0 lets light pass."""
     opacity = texture(reader, "opacity", 0.5)
-    nested = _nested(reader, most=1)[0][1]
-    if isinstance(opacity, Bitmap | Checkerboard) and _masked_by_texture(nested):
-        reader.fail(
-            "only one of the masks round a BSDF may have a texture as its opacity", "opacity", "multiply them"
-        )
-    return Mask(nested, opacity)
+    return Mask(_nested(reader, most=1)[0][1], opacity)
 
 
-def _masked_by_texture(bsdf: Bsdf) -> bool:
-    if not isinstance(bsdf, Mask):
-        return False
-    return isinstance(bsdf.opacity, Bitmap | Checkerboard) or _masked_by_texture(bsdf.nested)
+def blendbsdf(reader: Reader) -> Blend:
+    """The `blendbsdf` plugin: two BSDFs, in the order given, the second of share `weight`."""
+    if not reader.has("weight"):
+        reader.fail("a blendbsdf needs a weight", hint="the share of the second BSDF, 0 to 1")
+    weight = share(reader, "weight")
+    found = _nested(reader, most=2)
+    if len(found) != 2:
+        reader.fail("a blendbsdf takes two BSDFs, got 1")
+    blend = Blend(found[0][1], found[1][1], weight)
+    if (count := count_parts(blend)) > MAX_PARTS:
+        reader.fail(f"a mixture takes at most {MAX_PARTS} BSDFs, got {count}")
+    return blend
 
 
 def _nested(reader: Reader, most: int) -> list[tuple[str, Bsdf]]:

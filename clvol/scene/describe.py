@@ -12,7 +12,7 @@ import numpy as np
 from clvol.base.memory import format_bytes
 from clvol.errors import VolumeError
 from clvol.scene import records
-from clvol.scene.materials import Bsdf, Dielectric, Mask, Null, TwoSided
+from clvol.scene.materials import Blend, Bsdf, Dielectric, Mask, Null, TwoSided
 from clvol.scene.tabulated import mean_cosine
 from clvol.scene.vocabulary import listed
 from clvol.volumes import GridInfo, read_volume
@@ -220,6 +220,9 @@ def _bsdf(bsdf: Bsdf) -> str:
             return f"two sided ({_bsdf(bsdf.front)}{back})"
         case Mask():
             return f"mask ({_bsdf(bsdf.nested)})"
+        case Blend():
+            share = f"{_spectrum(bsdf.weight)} of it " if isinstance(bsdf.weight, tuple) else "by a texture "
+            return f"blend ({_bsdf(bsdf.first)}, and {share}{_bsdf(bsdf.second)})"
     return name
 
 

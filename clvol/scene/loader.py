@@ -94,6 +94,7 @@ PLUGINS: PluginTable = {
         "principledthin": bsdf.principledthin,
         "twosided": bsdf.twosided,
         "mask": bsdf.mask,
+        "blendbsdf": bsdf.blendbsdf,
     },
     "medium": {
         "homogeneous": medium.homogeneous,

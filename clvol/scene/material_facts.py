@@ -2,103 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 from clvol.layout import BSDF_FACTS, PRINCIPLED_NUMBERS
 from clvol.scene.materials import (
     Bitmap,
     Bsdf,
     Checkerboard,
     Conductor,
-    Dielectric,
-    Diffuse,
-    Mask,
-    Null,
-    Plastic,
-    Principled,
-    PrincipledThin,
     RoughConductor,
     RoughDielectric,
-    RoughPlastic,
     Texture,
-    TwoSided,
 )
+from clvol.scene.sides import Mixture, Side, bsdf_looks, bsdf_parts, bsdf_weights, side_kind
 
-_KINDS = {
-    Null: "NULL",
-    Diffuse: "DIFFUSE",
-    Dielectric: "DIELECTRIC",
-    RoughDielectric: "ROUGH_DIELECTRIC",
-    Conductor: "CONDUCTOR",
-    RoughConductor: "ROUGH_CONDUCTOR",
-    Plastic: "PLASTIC",
-    RoughPlastic: "ROUGH_PLASTIC",
-    PrincipledThin: "PRINCIPLED_THIN",
-}
 _COLORS = (
     *("reflectance", "diffuse_reflectance", "specular_reflectance", "specular_transmittance"),
     "base_color",
 )
 _REFRACT = {"DIELECTRIC", "ROUGH_DIELECTRIC", "PRINCIPLED_GLASS", "PRINCIPLED_THIN"}
 _NUMBERS = ("alpha_u", "alpha_v", *PRINCIPLED_NUMBERS)
-_TABLES = {"ROUGH_PLASTIC", "PRINCIPLED", "PRINCIPLED_GLASS", "PRINCIPLED_THIN"}
-
-
-@dataclass(frozen=True)
-class Side:
-    """A surface as seen from one side: a BSDF that is no wrapper, behind masks of these opacities.
-
-    `black`: it absorbs whatever the masks do not let pass.  Equal where the BSDF is the same object.
-    """
-
-    bsdf: Bsdf
-    opacities: tuple[Texture, ...] = ()
-    black: bool = False
-
-
-def side_kind(bsdf: Bsdf) -> str:
-    """Name in `layout.BSDFS` of a BSDF that is no wrapper."""
-    match bsdf:
-        case Dielectric(thin=True):
-            return "THIN_DIELECTRIC"
-        case Principled():
-            return "PRINCIPLED" if bsdf.spec_trans == (0.0,) else "PRINCIPLED_GLASS"
-    return _KINDS[type(bsdf)]
-
-
-def bsdf_sides(bsdf: Bsdf) -> tuple[Side, Side | None]:
-    """Front and back of a surface; None: black.  What light passes has the same on both.
-
-    Raises
-    ------
-    ValueError
-        A two-sided BSDF round one that light passes, or two masks with textures round one BSDF.
-    """
-    if isinstance(bsdf, TwoSided):
-        front, back = bsdf_sides(bsdf.front)[0], bsdf_sides(bsdf.back)[0]
-        for side in (front, back):
-            if side.opacities or BSDF_FACTS[side_kind(side.bsdf)].transmits:
-                raise ValueError("a two-sided BSDF takes no BSDF that light passes")
-        return front, back
-    if isinstance(bsdf, Mask):
-        return _masked(bsdf)
-    side = Side(bsdf)
-    return side, side if BSDF_FACTS[side_kind(bsdf)].transmits else None
-
-
-def _masked(mask: Mask) -> tuple[Side, Side | None]:
-    front, back = bsdf_sides(mask.nested)
-    if isinstance(front.bsdf, Null) or mask.opacity in ((1.0,), (1.0, 1.0, 1.0)):
-        return front, back
-    if sum(isinstance(o, Bitmap | Checkerboard) for o in (mask.opacity, *front.opacities)) > 1:
-        raise ValueError("only one of the masks round a BSDF may have a texture")
-    back = Side(front.bsdf, front.opacities, black=True) if back is None else back
-    front, back = (replace(side, opacities=(*side.opacities, mask.opacity)) for side in (front, back))
-    return front, back
-
-
-def _parts(bsdf: Bsdf) -> list[Side]:
-    return [side for side in dict.fromkeys(bsdf_sides(bsdf)) if side is not None]
+_TABLES = {"ROUGH_PLASTIC", "PRINCIPLED", "PRINCIPLED_GLASS", "PRINCIPLED_THIN", "BLEND"}
 
 
 def _colors(side: Side) -> list[Texture]:
@@ -120,13 +42,14 @@ def _color_is_grey(color: Texture) -> bool:
 
 def bsdf_kinds(bsdf: Bsdf) -> set[str]:
     """Names in `layout.BSDFS` of what is on either side."""
-    return {side_kind(side.bsdf) for side in _parts(bsdf)}
+    blended = any(isinstance(look, Mixture) for look in bsdf_looks(bsdf))
+    return {side_kind(side.bsdf) for side in bsdf_parts(bsdf)} | ({"BLEND"} if blended else set())
 
 
 def is_grey(bsdf: Bsdf) -> bool:
     """Whether it treats all channels alike; opacities always do."""
-    colors = [color for side in _parts(bsdf) for color in _colors(side)]
-    metals = [s.bsdf for s in _parts(bsdf) if isinstance(s.bsdf, Conductor | RoughConductor)]
+    colors = [color for side in bsdf_parts(bsdf) for color in _colors(side)]
+    metals = [s.bsdf for s in bsdf_parts(bsdf) if isinstance(s.bsdf, Conductor | RoughConductor)]
     return all(_color_is_grey(color) for color in colors) and all(
         len(set(value)) == 1 for metal in metals for value in (metal.eta, metal.k)
     )
@@ -134,7 +57,9 @@ def is_grey(bsdf: Bsdf) -> bool:
 
 def passes_light(bsdf: Bsdf) -> bool:
     """Whether light may go straight on: null, a mask, a thin dielectric.  Shadow rays look at those."""
-    return any(side.opacities or side_kind(side.bsdf) in ("NULL", "THIN_DIELECTRIC") for side in _parts(bsdf))
+    return any(
+        side.opacities or side_kind(side.bsdf) in ("NULL", "THIN_DIELECTRIC") for side in bsdf_parts(bsdf)
+    )
 
 
 def is_transmissive(bsdf: Bsdf) -> bool:
@@ -154,13 +79,14 @@ def samples_lights(bsdf: Bsdf) -> bool:
 
 def bsdf_textures(bsdf: Bsdf) -> list[Bitmap | Checkerboard]:
     """Its textures, opacities included, in no particular order."""
-    found = [t for side in _parts(bsdf) for t in (*_colors(side), *_numbers(side), *side.opacities)]
+    found = [t for side in bsdf_parts(bsdf) for t in (*_colors(side), *_numbers(side), *side.opacities)]
+    found += bsdf_weights(bsdf)
     return [t for t in found if isinstance(t, Bitmap | Checkerboard)]
 
 
 def has_rough_textures(bsdf: Bsdf) -> bool:
     """Whether a microfacet model's roughness has a texture (that of principled ones is in a table)."""
-    sides = [s.bsdf for s in _parts(bsdf) if isinstance(s.bsdf, RoughDielectric | RoughConductor)]
+    sides = [s.bsdf for s in bsdf_parts(bsdf) if isinstance(s.bsdf, RoughDielectric | RoughConductor)]
     return any(isinstance(a, Bitmap | Checkerboard) for s in sides for a in (s.alpha_u, s.alpha_v))
 
 

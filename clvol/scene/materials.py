@@ -1,7 +1,7 @@
 """What surfaces are made of: textures and BSDFs as plain frozen records.
 
 As in `records`, nothing here knows Mitsuba's syntax or OpenCL.  A shape's BSDF is a `Bsdf`; wrappers (`Mask`,
-`TwoSided`) hold others.
+`TwoSided`, `Blend`) hold others.
 """
 
 from __future__ import annotations
@@ -200,6 +200,15 @@ class Mask:
     opacity: Texture = (0.5,)
 
 
+@dataclass(frozen=True, eq=False)
+class Blend:
+    """`first` or `second` by chance, the second in this share of cases."""
+
+    first: Bsdf
+    second: Bsdf
+    weight: Texture = (0.5,)
+
+
 Bsdf = (
     Null
     | Diffuse
@@ -213,4 +222,5 @@ Bsdf = (
     | PrincipledThin
     | TwoSided
     | Mask
+    | Blend
 )

@@ -225,12 +225,16 @@ _COLOURS = {
     "specular_reflectance",
     "specular_transmittance",
     "opacity",
+    "weight",
     "color0",
     "color1",
     "base_color",
     *PRINCIPLED_NUMBERS,
 }
-_NESTED = {"front": "brdf_0", "back": "brdf_1", "nested": "nested_bsdf"}
+_NESTED = {
+    **{"front": "brdf_0", "back": "brdf_1", "nested": "nested_bsdf"},
+    **{"first": "bsdf_0", "second": "bsdf_1"},
+}
 
 
 def _bsdf(bsdf: Any, seen: set[int]) -> Found:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -80,6 +81,16 @@ def texture(reader: Reader, name: str, default: float, maximum: float = 1.0) -> 
         reader.refuse_plugin(name, "a number, an rgb, a spectrum or a texture")
     picture: Texture = reader.build(found[0][1])
     return picture
+
+
+def share(reader: Reader, name: str) -> Texture:
+    """A share that must be given: a number, which is cut to [0, 1] as Mitsuba does, a colour or a texture."""
+    if not isinstance(reader.node.get(name), Real):
+        return texture(reader, name, 0.5)
+    given = reader.number(name, 0.5)
+    if not 0 <= given <= 1:
+        reader.approximated("the nearest number from 0 to 1, as in Mitsuba", name)
+    return (min(max(given, 0.0), 1.0),)
 
 
 def roughness(reader: Reader, name: str, default: Roughness) -> Roughness:

@@ -23,7 +23,7 @@ LATER: dict[str, tuple[str, ...]] = {
         *("ellipsoids", "heightfield"),
     ),
     "bsdf": (
-        *("bumpmap", "normalmap", "blendbsdf", "measured", "measured_polarized", "hair"),
+        *("bumpmap", "normalmap", "measured", "measured_polarized", "hair"),
         *("pplastic", "polarizer", "retarder", "circular"),
     ),
     "phase": ("sggx",),

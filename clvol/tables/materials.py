@@ -1,6 +1,7 @@
 """BSDFs of a scene as what the device reads: one material per distinct side of a surface, and their textures.
 
-Wrappers end here: a `TwoSided` becomes the two materials of a shape, a `Mask` the opacity of a material.
+Wrappers end here: a `TwoSided` becomes the two materials of a shape, a `Mask` the opacity of a material, a
+`Blend` a material that is a list of others.
 Nothing here needs a device.
 """
 
@@ -13,8 +14,9 @@ import numpy as np
 
 from clvol import layout
 from clvol.scene import materials
-from clvol.scene.material_facts import Side, bsdf_sides, side_kind
 from clvol.scene.materials import Bitmap, Bsdf, Checkerboard, Texture
+from clvol.scene.sides import Look, Mixture, Side, bsdf_sides, side_kind
+from clvol.tables.blends import blend_entries
 from clvol.tables.coat import MIN_ALPHA, coat_table, diffuse_reflectance
 from clvol.tables.colours import rgb
 from clvol.tables.textures import TextureTable, mean_color
@@ -51,17 +53,24 @@ def material_table(bsdfs: Sequence[Bsdf]) -> MaterialTable:
     """
     textures = TextureTable()
     tables: list[np.ndarray] = []
-    numbers: dict[Side, int] = {}
+    numbers: dict[Look, int] = {}
     records: list[np.ndarray] = []
+
+    def number(look: Look | None) -> int:
+        if look is None:
+            return BLACK
+        if look not in numbers:
+            if isinstance(look, Mixture):
+                record = _blend(blend_entries(look, number, textures), tables)
+            else:
+                record = _record(look, textures, tables)
+            numbers[look] = len(records)
+            records.append(record)
+        return numbers[look]
+
     sides = np.full((len(bsdfs), 2), BLACK, np.int32)
     for n, bsdf in enumerate(bsdfs):
-        for where, side in enumerate(bsdf_sides(bsdf)):
-            if side is None:
-                continue
-            if side not in numbers:
-                numbers[side] = len(records)
-                records.append(_record(side, textures, tables))
-            sides[n, where] = numbers[side]
+        sides[n] = [number(look) for look in bsdf_sides(bsdf)]
     return MaterialTable(
         np.array(records, layout.MATERIAL),
         np.array(textures.records, layout.TEXTURE),
@@ -109,6 +118,13 @@ def _record(side: Side, textures: TextureTable, tables: list[np.ndarray]) -> np.
             )
     if isinstance(bsdf, materials.Plastic | materials.RoughPlastic):
         _set_coat(record, bsdf, tables)
+    return record
+
+
+def _blend(entries: np.ndarray, tables: list[np.ndarray]) -> np.ndarray:
+    record = np.zeros((), layout.MATERIAL)
+    record["kind"], record["opacity"], record["opacity_texture"] = layout.enum("MATERIAL", "BLEND"), 1.0, -1
+    _add_table(record, entries, tables)
     return record
 
 

@@ -18,7 +18,7 @@ PLUGINS = {
         for name in (
             *("null", "diffuse", "dielectric", "thindielectric", "roughdielectric", "conductor"),
             *("roughconductor", "plastic", "roughplastic", "twosided", "mask"),
-            *("principled", "principledthin"),
+            *("principled", "principledthin", "blendbsdf"),
         )
     },
     "texture": {"bitmap": texture.bitmap, "checkerboard": texture.checkerboard},
@@ -62,7 +62,7 @@ __kernel void value_probe(SCENE, __global const int *number, __global const floa
     float pdf;
     vstore3((float3)(bsdf_value(&scene, material, vload2(i, uv), in, vload3(i, wo), CHANNEL, &pdf)), 0, o);
     o[3] = pdf;
-    vstore3((float3)(null_transmission(&scene, material, vload2(i, uv), in.z, CHANNEL)), 0, o + 4);
+    vstore3((float3)(STRAIGHT_TRANSMISSION(&scene, material, vload2(i, uv), in.z, CHANNEL)), 0, o + 4);
     o[7] = material_opacity(&scene, material, vload2(i, uv));
 }
 

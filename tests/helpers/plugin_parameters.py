@@ -253,6 +253,10 @@ PARAMETERS = {
     ),
     "twosided": ({"inner": {"type": "diffuse"}}, {"inner": {"type": "plastic"}, "back": {"type": "plastic"}}),
     "mask": ({"inner": {"type": "diffuse"}}, {"inner": {"type": "plastic"}, "opacity": TEXTURE}),
+    "blendbsdf": (
+        {"weight": 0.5, "a": {"type": "diffuse"}, "b": {"type": "plastic"}},
+        {"weight": TEXTURE, "a": {"type": "conductor"}, "b": {"type": "null"}},
+    ),
     "homogeneous": ({"emission": 1.0, "temperature": 900.0}, MEDIUM),
     "heterogeneous": ({"emission": 1.0, "temperature": 900.0}, MEDIUM | {"sigma_t": VOLUME}),
     "classified": (

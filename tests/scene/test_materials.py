@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from material_probe import read
 
-from clvol import layout
+from clvol import layout, load_dict
 from clvol.errors import SceneError
 from clvol.scene import material_facts as facts
 from clvol.scene.materials import (
+    Blend,
     Conductor,
     Dielectric,
     Diffuse,
@@ -22,12 +23,14 @@ from clvol.scene.materials import (
     TwoSided,
 )
 from clvol.scene.refraction import INDICES, METALS
+from clvol.scene.sides import bsdf_parts
 from clvol.tables.coat import coat_shares, diffuse_reflectance, fresnel
 from clvol.tables.materials import BLACK, material_table
 
 RED = {"type": "rgb", "value": [0.8, 0.4, 0.1]}
 CHECKERS = {"type": "checkerboard"}
 DIFFUSE = {"type": "diffuse"}
+BLEND = {"type": "blendbsdf", "weight": 0.25, "a": DIFFUSE, "b": {"type": "dielectric"}}
 
 
 def rgb(*values):
@@ -146,10 +149,14 @@ def test_names_of_indices_and_metals():
         ({"type": "mask", "opacity": 0.5}, "no BSDF in it"),
         ({"type": "mask", "opacity": 1.5, "a": DIFFUSE}, r"in \[0, 1\]"),
         ({"type": "mask", "a": DIFFUSE, "b": DIFFUSE}, "at most 1 BSDFs, got 2"),
-        (
-            {"type": "mask", "opacity": CHECKERS, "a": {"type": "mask", "opacity": CHECKERS, "b": DIFFUSE}},
-            "only one of the masks",
-        ),
+        ({"type": "blendbsdf", "a": DIFFUSE, "b": DIFFUSE}, "needs a weight"),
+        (BLEND | {"weight": np.nan}, "finite"),
+        (BLEND | {"weight": rgb(0, 0.5, 1.5)}, r"in \[0, 1\]"),
+        (BLEND | {"weight": DIFFUSE}, "a spectrum or a texture, got a 'diffuse'"),
+        ({"type": "blendbsdf", "weight": 0.5, "a": DIFFUSE}, "takes two BSDFs, got 1"),
+        (BLEND | {"c": DIFFUSE}, "at most 2 BSDFs, got 3"),
+        ({"type": "twosided", "a": BLEND | {"b": {"type": "null"}}}, "takes no BSDF that light passes"),
+        ({"type": "twosided", "a": BLEND}, "takes no BSDF that light passes"),
         ({"type": "bumpmap"}, "not supported in this version"),
         ({"type": "principled", "eta": 1.5, "specular": 0.5}, "either eta or specular"),
         ({"type": "principled", "specular": 12.5}, "must be"),
@@ -203,6 +210,34 @@ def test_the_back_of_a_masked_front_is_black_and_masked():
     assert table.materials["specular"].tolist() == [[1, 1, 1], [0, 0, 0]]
 
 
+def test_mixtures_are_lists_of_parts():
+    inner = BLEND | {"weight": CHECKERS, "b": {"type": "conductor"}}
+    glass = {"type": "dielectric"}
+    table = table_of({"type": "blendbsdf", "weight": 0.25, "a": inner, "b": glass}, BLEND | {"weight": 0.0})
+    assert table.sides.tolist() == [[3, 4], [5, BLACK]]
+    assert kinds(table) == ["DIFFUSE", "CONDUCTOR", "DIELECTRIC", "BLEND", "BLEND", "DIFFUSE"]
+    front, back = np.split(table.tables, [table.materials["table"][4]])
+    assert front.tolist() == [3, 0, 0.75, 1, -1, 1, 0.75, 1, 0, 2, 0.25, 0]
+    assert back.tolist() == [2, BLACK, 0.75, 0, 2, 0.25, 0]  # opaque ones are black from behind
+
+
+def test_shares_are_cut_as_in_mitsuba():
+    for given, used in ((1.5, 1.0), (-0.5, 0.0)):
+        ball = {"type": "sphere", "bsdf": BLEND | {"weight": given}}
+        scene = load_dict({"type": "scene", "camera": {"type": "perspective"}, "ball": ball})
+        assert scene.shapes[0].bsdf.weight == (used,)
+        assert "nearest number from 0 to 1" in scene.approximated[0]
+
+
+def test_mixtures_of_mixtures_are_bounded():
+    found = BLEND
+    for _ in range(5):
+        found = {"type": "blendbsdf", "weight": 0.5, "a": found, "b": found}
+    assert len(bsdf_parts(read(found))) == 64
+    with pytest.raises(SceneError, match="at most 64 BSDFs, got 128"):
+        read({"type": "blendbsdf", "weight": 0.5, "a": found, "b": found})
+
+
 def test_each_object_once():
     shared = read(DIFFUSE)
     table = material_table([shared, TwoSided(shared, shared), shared, Diffuse()])
@@ -231,8 +266,14 @@ def test_numbers_of_a_record():
 def test_records_that_no_loader_makes_are_refused():
     with pytest.raises(ValueError, match="two-sided"):
         material_table([TwoSided(Dielectric(), Diffuse())])
-    with pytest.raises(ValueError, match="only one"):
-        material_table([Mask(Mask(Diffuse(), read(CHECKERS)), read(CHECKERS))])
+    with pytest.raises(ValueError, match="two-sided"):
+        material_table([TwoSided(Blend(Diffuse(), Null()), Diffuse())])
+
+
+def test_masks_of_two_textures_are_mixtures_with_nothing():
+    table = material_table([Mask(Mask(Diffuse(), read(CHECKERS)), read(CHECKERS))])
+    assert table.sides.tolist() == [[2, 4]]
+    assert kinds(table) == ["NULL", "DIFFUSE", "BLEND", "DIFFUSE", "BLEND"]
 
 
 # -- coats -------------------------------------------------------------------------------------------

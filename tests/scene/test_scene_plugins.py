@@ -419,8 +419,8 @@ def test_a_spheres_center_and_radius_apply_before_to_world():
     ("shape", "message"),
     [
         (
-            {"type": "cube", "bsdf": {"type": "blendbsdf"}},
-            "scene.s.bsdf: bsdf 'blendbsdf' is not supported",
+            {"type": "cube", "bsdf": {"type": "measured"}},
+            "scene.s.bsdf: bsdf 'measured' is not supported",
         ),
         ({"type": "cube", "bsdf": {"type": "nul"}}, "unknown plugin 'nul'; did you mean 'null'?"),
         (
@@ -671,7 +671,7 @@ def test_a_dict_inside_itself_is_an_error():
 
 
 def test_unused_plugins_are_checked_too():
-    assert "bsdf 'blendbsdf' is not supported" in error_of(paint={"type": "blendbsdf"})
+    assert "bsdf 'measured' is not supported" in error_of(paint={"type": "measured"})
 
 
 def test_parameters_without_effect_are_accepted():

@@ -37,6 +37,7 @@ PICTURES = {
     "room": ("room", {}, 96, 2048),
     "glass": ("glass", {}, 32, 1024),
     "meshes": ("meshes", {}, 32, 4096),
+    "coats": ("coats", {}, 64, 2048),
     "shapes": ("shapes", {}, 64, 4096),
     "attributes": ("attributes", {}, 64, 1024),
     "lamps": ("lamps", {}, 64, 2048),
