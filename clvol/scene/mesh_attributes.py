@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clvol.scene.material_facts import bsdf_sides, bsdf_textures
+from clvol.scene.material_facts import bsdf_textures
 from clvol.scene.materials import Bitmap, Bsdf, MeshAttribute, Texture
+from clvol.scene.sides import bsdf_parts
 from clvol.scene.texture import check_texels
 
 if TYPE_CHECKING:
@@ -109,7 +110,7 @@ def _check_alone(reader: Reader, bsdf: Bsdf, mesh: Mesh, mixed: bool) -> None:
     turned = any(
         getattr(part, "alpha_u", 0) is not getattr(part, "alpha_v", 0)
         or getattr(part, "anisotropic", 0) not in (0, (0.0,))
-        for part in (side.bsdf for side in bsdf_sides(bsdf) if side)
+        for part in (side.bsdf for side in bsdf_parts(bsdf))
     )
     if mesh.uvs is not None and turned:
         what = "an anisotropic BSDF that shows attributes of a mesh with texture coordinates is not supported"

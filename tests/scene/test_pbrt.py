@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 import clvol
 from clvol.cli.main import main
+from clvol.scene.materials import Blend, Dielectric, TwoSided
 from clvol.scene.records import ConstantEmitter, ConstVolume, GridVolume
 
 CAMERA = """
@@ -194,6 +195,17 @@ def test_a_boundary_without_media_is_nothing_and_path_sees_none(load):
     assert not load('Material "interface" Shape "sphere"').shapes
     scene = load(f'{medium} Material "diffuse" Shape "sphere"', f'{CAMERA} Integrator "path"')
     assert scene.shapes[0].interior is None and "media are left out" in "".join(scene.approximated)
+
+
+def test_a_mix_is_a_blend_of_its_two_materials(load):
+    named = 'MakeNamedMaterial "a" "string type" "diffuse" MakeNamedMaterial "b" "string type" "dielectric" '
+    for amount, weight in (("", (0.5,)), ('"float amount" 0.25', (0.25,))):
+        mix = load(f'{named} Material "mix" "string materials" ["a" "b"] {amount} Shape "sphere"')
+        blend = mix.shapes[0].bsdf
+        assert isinstance(blend, Blend) and blend.weight == weight
+        assert isinstance(blend.first, TwoSided) and isinstance(blend.second, Dielectric)
+    alone = load(f'{named} Material "mix" "string materials" ["a" "b"] "float amount" 1 Shape "sphere"')
+    assert isinstance(alone.shapes[0].bsdf, Dielectric)
 
 
 def test_what_cannot_be_rendered_is_told_at_once(load):
