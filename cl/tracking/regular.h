@@ -30,10 +30,10 @@ INLINE float invert_cubic(const Cubic *cubic, int channel, float target)
         else
             lower = w;
         float next = w - excess / slope;
+        if (abs_of(next - w) <= 1e-6f * w) /* before bounds are asked: an exact w is one itself */
+            break;
         if (!(next > lower && next < upper)) /* also where the slope is 0 */
             next = 0.5f * (lower + upper);
-        if (abs_of(next - w) <= 1e-6f * next)
-            break;
         w = next;
     }
     return w;
