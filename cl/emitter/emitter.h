@@ -8,6 +8,7 @@
 #include "emitter/envmap.h"
 #include "emitter/light_sample.h"
 #include "emitter/spot.h"
+#include "emitter/sun.h"
 
 /* Radiance of the environment seen along `direction`, and the density with which next-event
    estimation would have chosen that direction from `from`.  There is at most one environment, the first emitter. */
@@ -44,6 +45,12 @@ INLINE LightSample sample_light(const Scene *scene, float3 from, float pick, flo
         sample_spot(emitter, from, &light);
         return light;
     }
+#if CLVOL_HAS_SUN
+    if (emitter->kind == EMITTER_SUN) {
+        sample_sun(emitter, u, v, &light);
+        return light;
+    }
+#endif
     if (CLVOL_HAS_DIRECTIONAL && emitter->kind == EMITTER_DIRECTIONAL) {
         light.direction = -(float3)(emitter->vector[0], emitter->vector[1], emitter->vector[2]);
         light.value = emitter_value(emitter) / light.chosen;

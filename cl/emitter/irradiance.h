@@ -34,6 +34,10 @@ INLINE float3 light_middle(__global const Emitter *emitter, float3 p, float *dis
     *distance = INFINITY;
     if (emitter->kind == EMITTER_DIRECTIONAL)
         return -load_vector(emitter->vector);
+#if CLVOL_HAS_SUN
+    if (emitter->kind == EMITTER_SUN)
+        return -load_vector(emitter->vector);
+#endif
     const float3 to = load_vector(emitter->position) - p;
     *distance = max_of(sqrt_of(dot_of(to, to)), 1e-18f);
     return to / *distance;
@@ -48,6 +52,10 @@ INLINE float light_irradiance(__global const Emitter *emitter, float3 p)
         return value * (4.0f * PI);
     if (emitter->kind == EMITTER_DIRECTIONAL)
         return value;
+#if CLVOL_HAS_SUN
+    if (emitter->kind == EMITTER_SUN)
+        return value * emitter->area;
+#endif
     float distance;
     const float3 d = light_middle(emitter, p, &distance);
     const float square = distance * distance;

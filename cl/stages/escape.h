@@ -40,6 +40,12 @@ INLINE Spectrum escape_light(const Scene *scene, uint slot)
     const Ray ray = path_ray(scene, slot);
     const float3 rgb = environment(scene, ray.o, ray.d, &light_pdf);
     const float pdf = path_pdf(scene, slot);
+#if CLVOL_HAS_SUN
+    const float3 sun = sun_radiance(scene->emitters + sun_number(scene), ray.d);
+    const float sky_weight = pdf > 0.0f ? mis_weight(pdf, light_pdf) : 1.0f;
+    const float sun_weight = pdf > 0.0f ? mis_weight(pdf, sun_pdf(scene, ray.o)) : 1.0f;
+    return to_spectrum(rgb * sky_weight + sun * sun_weight, (int)path_channel(scene, slot));
+#endif
     return to_spectrum(rgb, (int)path_channel(scene, slot)) * (pdf > 0.0f ? mis_weight(pdf, light_pdf) : 1.0f);
 #else
     return (Spectrum)(0.0f);

@@ -81,11 +81,11 @@ EMITTER = _record(
     ("cdf", "f", 1),  # of picking it or one from number 1 on that comes before; of number 0: 1
     ("value", "f", 3),  # radiance, irradiance or intensity
     ("vector", "f", 3),  # direction of travel, a spot's axis, or the mean normal of an area light
-    ("position", "f", 3),  # of a point or spot, or the middle of an area light
+    ("position", "f", 3),  # of a point or spot, or the middle of an area light; up where a horizon cuts a sun
     ("cutoff_angle", "f", 1),  # of a spot, radians
     ("beam_width", "f", 1),  # of a spot, radians
     ("shape", "i", 1),  # of an area light
-    ("area", "f", 1),
+    ("area", "f", 1),  # or the solid angle of a sun
     ("first", "i", 1),  # of a mesh's entries in `light_faces` and `light_cdf`
     ("primitive", "u", 1),  # first primitive of an area light
     ("count", "u", 1),  # of its primitives, which follow each other
@@ -209,7 +209,7 @@ ENUMS = {
     "SHAPE": ("NONE", "CUBE", "SPHERE"),
     "PHASE": ("ISOTROPIC", "HG", "RAYLEIGH", "TABPHASE"),
     "TRANSFER": ("SIGMA_T", "ALBEDO", "EMISSION"),  # in the order of a medium's entries
-    "EMITTER": ("CONSTANT", "ENVMAP", "DIRECTIONAL", "POINT", "SPOT", "AREA"),
+    "EMITTER": ("CONSTANT", "ENVMAP", "DIRECTIONAL", "POINT", "SPOT", "AREA", "SUN"),
     "SURFACE": ("MESH", "SPHERE", "DISK", "CYLINDER"),
     "QUADRIC": ("SPHERE", "DISK", "CYLINDER"),
     "MATERIAL": BSDFS,

@@ -9,6 +9,7 @@ SAMPLED_LIGHTS = {
     "directional": "directional",
     "point_lights": "points",
     "spot": "spots",
+    "sun": "a sun",
     "area": "area lights",
 }
 """Lights that are worth shadow rays, as all are but a uniform sky; in words."""
@@ -51,6 +52,7 @@ class Features:
     directional: bool = False
     point_lights: bool = False
     spot: bool = False
+    sun: bool = False
     area_meshes: bool = False
     area_spheres: bool = False
     area_disks: bool = False

@@ -191,6 +191,8 @@ def _emitter_kind(emitter: records.Emitter) -> str:
             return "point_lights"
         case records.SpotEmitter():
             return "spot"
+        case records.SunEmitter():
+            return "sun"
     assert_never(emitter)
 
 
@@ -204,6 +206,8 @@ def _emitter_is_grey(emitter: records.Emitter) -> bool:
         case records.EnvmapEmitter(radiance=r):
             return all(bool((r[rows] == r[rows, :, :1]).all()) for rows in bands(*r.shape[:2]))
         case records.ConstantEmitter(radiance=value) | records.DirectionalEmitter(irradiance=value):
+            return len(set(value)) == 1
+        case records.SunEmitter(irradiance=value):
             return len(set(value)) == 1
         case records.PointEmitter(intensity=value) | records.SpotEmitter(intensity=value):
             return len(set(value)) == 1

@@ -290,6 +290,11 @@ def _emitter(emitter: records.Emitter) -> str:
                 f"spot, intensity {_spectrum(emitter.intensity)}, at {_point(position)}, along "
                 f"{_point(axis / np.linalg.norm(axis))}, to {_number(emitter.cutoff_angle)} degrees"
             )
+        case records.SunEmitter():
+            return (
+                f"sun, irradiance {_spectrum(emitter.irradiance)}, towards "
+                f"{_point(emitter.sun_direction)}, {_number(emitter.aperture)} degrees wide"
+            )
 
 
 def _box(box: np.ndarray) -> str:

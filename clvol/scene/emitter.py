@@ -36,7 +36,7 @@ class AreaLight:
 
 def constant(reader: Reader) -> ConstantEmitter:
     """The `constant` plugin: the same radiance from everywhere."""
-    _accept_common(reader)
+    accept_common(reader)
     reader.transform()  # turns nothing, and is allowed on every emitter
     return ConstantEmitter(reader.color("radiance", 1.0, light=True, maximum=BRIGHTEST))
 
@@ -46,7 +46,7 @@ def envmap(reader: Reader) -> EnvmapEmitter:
 
     Slightly negative values, which converted photographs have, become 0 (see `NEGLIGIBLE`).
     """
-    _accept_common(reader)
+    accept_common(reader)
     reader.ignore(mis_compensation=bool)
     if reader.has("filename") == reader.has("bitmap"):
         reader.fail("an envmap needs either a filename or a bitmap (array)")
@@ -86,7 +86,7 @@ def check_radiance(radiance: np.ndarray, scale: np.float32) -> str:
 
 def directional(reader: Reader) -> DirectionalEmitter:
     """The `directional` plugin: light travels along `direction`, or along `to_world`'s local +z."""
-    _accept_common(reader)
+    accept_common(reader)
     irradiance = reader.color("irradiance", 1.0, light=True, maximum=BRIGHTEST)
     if reader.has("direction") and reader.has("to_world"):
         reader.fail("give either direction or to_world, not both", "to_world")
@@ -99,7 +99,7 @@ def directional(reader: Reader) -> DirectionalEmitter:
 
 def point(reader: Reader) -> PointEmitter:
     """The `point` plugin: at `position`, or at the origin of `to_world`."""
-    _accept_common(reader)
+    accept_common(reader)
     intensity = reader.color("intensity", 1.0, light=True, maximum=MOST_INTENSE)
     if reader.has("position") and reader.has("to_world"):
         reader.fail("give either position or to_world, not both", "to_world")
@@ -109,7 +109,7 @@ def point(reader: Reader) -> PointEmitter:
 
 def spot(reader: Reader) -> SpotEmitter:
     """The `spot` plugin: a cone of light along local +z, which fades from `beam_width` to `cutoff_angle`."""
-    _accept_common(reader)
+    accept_common(reader)
     reader.refuse("texture", "the spot is the same all round")
     intensity = reader.color("intensity", 1.0, light=True, maximum=MOST_INTENSE)
     cutoff = reader.number("cutoff_angle", 20.0, minimum=0.0, maximum=180.0)
@@ -126,7 +126,7 @@ def spot(reader: Reader) -> SpotEmitter:
 
 def area(reader: Reader) -> AreaLight:
     """The `area` plugin, which makes the shape round it a light of the same radiance all over."""
-    _accept_common(reader)
+    accept_common(reader)
     if reader.has("radiance") and not reader.is_value("radiance"):
         reader.fail(
             "the radiance of an area emitter cannot vary over the shape",
@@ -136,7 +136,7 @@ def area(reader: Reader) -> AreaLight:
     return AreaLight(reader.color("radiance", 1.0, light=True, maximum=BRIGHTEST))
 
 
-def _accept_common(reader: Reader) -> None:
+def accept_common(reader: Reader) -> None:
     """Accept what every emitter may carry: a share of the samples, and the medium that it is in.
 
     The medium is found from the shapes (Mitsuba's path tracers do not look at it).

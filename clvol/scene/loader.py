@@ -20,6 +20,7 @@ from clvol.scene import (
     phase,
     sensor,
     shape,
+    sunsky,
     tabulated,
     texture,
     volume,
@@ -120,6 +121,7 @@ PLUGINS: PluginTable = {
         "point": emitter.point,
         "spot": emitter.spot,
         "area": emitter.area,
+        "sunsky": sunsky.sunsky,
     },
     "texture": {
         **SPECTRA,
@@ -285,7 +287,7 @@ def _build(root: Node, source: str, grids: Grids | None, faults: Faults, plugins
     records = _records(root, library)
     sensors = _sensors(records["sensor"])
     shapes = groups.all_shapes(record for _, record in records["shape"])
-    emitters = [(node, light) for node, light in records["emitter"] if not _is_inside(node, light, library)]
+    emitters = _emitters(records["emitter"], library)
     chosen = Integrator()
     try:
         chosen = _integrator(records["integrator"], _what_has_media(sensors, shapes))
@@ -343,6 +345,13 @@ def _records(root: Node, library: Library) -> dict[str, list[tuple[Node, Any]]]:
             if record is not None:
                 records.setdefault(kind, []).append((node, record))
     return records
+
+
+def _emitters(records: list[tuple[Node, Any]], library: Library) -> list[tuple[Node, Any]]:
+    """The scene's emitters with their nodes, where a plugin makes several one by one."""
+    several = [(node, made if isinstance(made, tuple) else (made,)) for node, made in records]
+    lights = [(node, light) for node, made in several for light in made]
+    return [(node, light) for node, light in lights if not _is_inside(node, light, library)]
 
 
 def _is_inside(node: Node, record: object, library: Library) -> bool:

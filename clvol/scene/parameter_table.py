@@ -271,6 +271,9 @@ def _emitter(emitter: records.Emitter, _seen: set[int]) -> Found:
         case records.DirectionalEmitter():
             yield "irradiance.value", _colour(emitter, "irradiance", values.BRIGHTEST)
             yield "direction", _field(emitter, "direction", values.direction)
+        case records.SunEmitter():
+            yield "irradiance.value", _colour(emitter, "irradiance", values.BRIGHTEST)
+            yield "sun_direction", _field(emitter, "sun_direction", values.direction)
         case records.PointEmitter():
             yield "intensity.value", _colour(emitter, "intensity", values.MOST_INTENSE)
             yield "position", _field(emitter, "position", values.point)

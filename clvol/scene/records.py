@@ -356,7 +356,27 @@ class SpotEmitter:
     name: str = field(default="", compare=False, repr=False)
 
 
-Emitter = ConstantEmitter | EnvmapEmitter | DirectionalEmitter | PointEmitter | SpotEmitter
+@dataclass(frozen=True)
+class SunEmitter:
+    """Far disk of even radiance, in front of an environment, which a scene with a sun has.
+
+    irradiance : normal to `sun_direction`, of the whole disk.  sun_direction : unit, towards its middle.
+    aperture : degrees from edge to edge.  up : unit, where a horizon cuts the disk; else None.
+    """
+
+    irradiance: Spectrum
+    sun_direction: tuple[float, float, float]
+    aperture: float
+    up: tuple[float, float, float] | None = None
+    name: str = field(default="", compare=False, repr=False)
+
+    @property
+    def solid_angle(self) -> float:
+        """Of the whole disk, steradians."""
+        return float(4 * np.pi * np.sin(np.radians(self.aperture / 4)) ** 2)
+
+
+Emitter = ConstantEmitter | EnvmapEmitter | DirectionalEmitter | PointEmitter | SpotEmitter | SunEmitter
 """Lights that are no surface; area lights are shapes with an `emission`."""
 
 

@@ -27,7 +27,7 @@ LATER: dict[str, tuple[str, ...]] = {
         *("pplastic", "polarizer", "retarder", "circular"),
     ),
     "phase": ("sggx",),
-    "emitter": ("projector", "directionalarea", "sunsky"),
+    "emitter": ("projector", "directionalarea", "timed_sunsky"),
     "texture": ("volume",),
 }
 """Kind -> plugins known by name and not supported in this version."""

@@ -59,7 +59,7 @@ def light_table(
     surfaces : None where a scene has none.
 
     The environment comes first, or else the strongest light; the others follow, weakest first, in the order
-    of their intervals of the random number that chooses (`selection`).
+    of their intervals of the random number that chooses (`selection`), but for a sun, which comes last.
     """
     emitters = emitter_order(scene)
     shapes = () if surfaces is None else surfaces.shapes
@@ -79,7 +79,8 @@ def light_table(
                 faces.append(members)
                 cdf.append(shares)
             power[i] = _describe_area(table[i], shapes[number], emission, number, centre)
-    order = np.argsort(power, kind="stable")
+    late = np.where(table["kind"] == layout.enum("EMITTER", "sun"), np.inf, power)
+    order = np.argsort(late, kind="stable")
     if len(order):
         first = 0 if emitters and _is_environment(emitters[0]) else order[-1]
         order = np.concatenate([[first], order[order != first]])
@@ -208,6 +209,12 @@ def _describe_emitter(record: np.void, emitter: records.Emitter, centre: np.ndar
             record["vector"] = axis / np.linalg.norm(axis)
             record["position"] = emitter.to_world[:3, 3] - centre
             record["cutoff_angle"], record["beam_width"] = cutoff, beam
+        case records.SunEmitter():
+            solid_angle = emitter.solid_angle
+            value = tuple(np.asarray(emitter.irradiance) / solid_angle)
+            extent = solid_angle * disc
+            record["vector"], record["area"] = np.negative(emitter.sun_direction), solid_angle
+            record["position"] = emitter.up or np.zeros(3)
     record["kind"] = layout.enum("EMITTER", type(emitter).__name__.removesuffix("Emitter"))
     record["value"] = rgb(value)
     return extent * float(luminance(rgb(value)))

@@ -106,6 +106,8 @@ def mean_incident_radiance(scene: records.Scene) -> tuple[np.ndarray, np.ndarray
                 sky += rgb(emitter.radiance)
             case records.DirectionalEmitter():
                 suns += rgb(emitter.irradiance) / (4 * np.pi)
+            case records.SunEmitter():
+                suns += rgb(emitter.irradiance) / (4 * np.pi)
             case records.EnvmapEmitter():
                 rows = emitter.radiance.mean(axis=1, dtype=np.float64)
                 weights = np.sin(np.pi * np.arange(len(rows)) / max(len(rows) - 1, 1)) + 1e-9

@@ -328,6 +328,14 @@ PARAMETERS = {
     "directional": ({}, LIGHT | {"irradiance": RGB, "direction": [1, 2, 3], "to_world": TURNED}),
     "point": ({}, LIGHT | {"intensity": RGB, "position": [1, 2, 3], "to_world": MOVED}),
     "spot": ({}, LIGHT | {"intensity": RGB, "cutoff_angle": 30.0, "beam_width": 5.0, "to_world": TURNED}),
+    "sunsky": (
+        {},
+        LIGHT
+        | {"turbidity": 4.0, "albedo": RGB, "sky_scale": 2.0, "sun_scale": 0.5, "sun_aperture": 3.0}
+        | {"sun_direction": [1, 2, 3], "complex_sun": Silent(True), "to_world": TURNED}
+        | {"latitude": 20.0, "longitude": 20.0, "timezone": 2.0, "year": 1999, "month": 3, "day": 3}
+        | {"hour": 10.0, "minute": 20.0, "second": 300.0},
+    ),
     "area": ({}, LIGHT | {"radiance": RGB}),
     "bitmap": (
         {"bitmap": TEXELS},

@@ -93,7 +93,7 @@ def test_wheel_says_its_licence_and_holds_its_text(wheel: Path) -> None:
         [text] = [name for name in archive.namelist() if name.endswith("dist-info/licenses/LICENSE")]
         assert archive.read(text) == (ROOT / "LICENSE").read_bytes()
         [metadata] = [name for name in archive.namelist() if name.endswith("dist-info/METADATA")]
-        assert b"\nLicense-Expression: Apache-2.0\n" in archive.read(metadata)
+        assert b"\nLicense-Expression: Apache-2.0 AND BSD-3-Clause\n" in archive.read(metadata)
 
 
 def test_the_citation_names_this_version_and_this_licence() -> None:

@@ -26,6 +26,10 @@ MITSUBAS = {
     "point": "intensity position sampling_weight to_world",
     "spot": "beam_width cutoff_angle intensity sampling_weight texture to_world",
     "area": "radiance sampling_weight to_world",
+    "sunsky": (
+        "albedo complex_sun day hour latitude longitude minute month sampling_weight second sky_scale "
+        "sun_aperture sun_direction sun_scale timezone to_world turbidity year"
+    ),
     "envmap": "bitmap filename mis_compensation sampling_weight scale to_world",
     "perspective": (
         "far_clip focal_length focus_distance fov fov_axis near_clip principal_point_offset_x "
