@@ -54,14 +54,24 @@ def find_features(scene: records.Scene, found: Boundaries) -> Features:
         or (bool(lamps) and scene.integrator.hide_emitters),
         filter_table=scene.film.rfilter.kind != "box",
         signed_filter=scene.film.rfilter.signed,
-        lens=isinstance(scene.sensor, records.Perspective) and scene.sensor.aperture_radius > 0,
-        parallel_rays=isinstance(scene.sensor, records.Orthographic),
+        lens=_has_lens(scene.sensor),
+        parallel_rays=not isinstance(scene.sensor, records.Perspective),
         depth_limited=scene.integrator.max_depth >= 0,
         hide_emitters=scene.integrator.hide_emitters,
         hide_environment=scene.integrator.hide_emitters or scene.film.backdrop is not None,
         backdrop=any(scene.film.backdrop or ()),
         alpha=scene.film.has_alpha,
     )
+
+
+def _has_lens(sensor: records.Camera) -> bool:
+    """Whether rays start from somewhere on a disk."""
+    if isinstance(sensor, records.Meter):
+        over_disk = sensor.target is None or (
+            isinstance(sensor.target, records.Shape) and sensor.target.kind == "disk"
+        )
+        return sensor.distant and over_disk
+    return isinstance(sensor, records.Perspective) and sensor.aperture_radius > 0
 
 
 def _place_features(scene: records.Scene, found: Boundaries) -> dict[str, Any]:

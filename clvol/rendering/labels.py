@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.picture.scenery import Scenery
-from clvol.scene.records import GridVolume
+from clvol.scene.records import GridVolume, Meter
 from clvol.tables.camera import camera_rays
 from clvol.volumes.grid import DenseGrid
 
@@ -16,7 +16,12 @@ if TYPE_CHECKING:
 
 
 def scenery_of(prepared: PreparedScene) -> Scenery | None:
-    """The camera and the one volume that has an extinction; None where there are none or several."""
+    """The camera and the one volume that has an extinction; None where there are none or several.
+
+    There are no labels of what is one pixel.
+    """
+    if isinstance(prepared.scene.sensor, Meter):
+        return None
     volumes = {id(m.sigma_t): m for m in prepared.matter.media if isinstance(m.sigma_t, GridVolume)}
     if len(volumes) != 1:
         return None

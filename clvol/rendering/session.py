@@ -25,7 +25,7 @@ from clvol.rendering.residence import Residence, compiled
 from clvol.rendering.upload import upload_scene
 from clvol.rendering.wavefront import Pool, Wavefront
 from clvol.scene.digest import scene_digest
-from clvol.tables.camera import camera_rays
+from clvol.tables.camera import camera_rays, reach_of
 from clvol.tables.colours import rgb
 from clvol.tables.light_cache import light_cache_record
 from clvol.tables.pixel_filter import FILTER_BINS
@@ -262,7 +262,7 @@ def render_record(prepared: PreparedScene, seed: int) -> np.ndarray:
     record["backdrop"] = rgb(scene.film.backdrop or (0.0,))
     record["sample_border"] = int(scene.film.sample_border)
     everywhere = any(entry.everywhere for entry in prepared.boundaries.entries)
-    reach = np.inf if everywhere else prepared.radius  # of what a ray can meet
+    reach = reach_of(scene.sensor, prepared.radius, everywhere)
     rays = camera_rays(scene.sensor, scene.film, prepared.centre, reach)
     for field, value in {
         "camera_eye": rays.eye,

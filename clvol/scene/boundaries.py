@@ -246,7 +246,11 @@ def _starts_of_rays(sensor: records.Camera, film: records.Film) -> tuple[np.ndar
         corners = sensor.at([0, width, 0, width], [0, 0, height, height], film)
         aside = np.ptp(corners, axis=0)  # filters may reach beyond the film
         return corners.min(axis=0) - aside, corners.max(axis=0) + aside
+    if isinstance(sensor, records.Meter) and sensor.distant:
+        return np.full(3, np.inf), np.full(3, -np.inf)  # outside of all
     eye = sensor.to_world[:3, 3]
+    if isinstance(sensor, records.Meter):
+        return eye, eye
     tangent = np.tan(np.radians(sensor.fov) / 2) * max(width / height, height / width)
     aside = tangent * (2 + 2 * max(map(abs, sensor.principal_point_offset)))
     near_point = sensor.near_clip * (1 + 2 * aside)  # the farthest point of the near plane in view

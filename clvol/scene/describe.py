@@ -177,12 +177,24 @@ def _camera(sensor: records.Camera) -> str:
     if isinstance(sensor, records.Orthographic):
         width = _number(2 * float(np.linalg.norm(sensor.to_world[:3, 0])))
         return f"orthographic at {position}, {width} wide{inside}"
+    if isinstance(sensor, records.Meter):
+        return _meter(sensor) + inside
     fov = _number(sensor.fov)
     if not sensor.aperture_radius:
         return f"perspective at {position}, field of view {fov} degrees{inside}"
     radius, distance = _number(sensor.aperture_radius), _number(sensor.focus_distance)
     lens = f"aperture radius {radius}, in focus at {distance}"
     return f"thin lens at {position}, field of view {fov} degrees, {lens}{inside}"
+
+
+def _meter(sensor: records.Meter) -> str:
+    along = f"along {_point(sensor.to_world[:3, 2])}"
+    if not sensor.distant:
+        return f"radiance at {_point(sensor.to_world[:3, 3])} {along}"
+    if isinstance(sensor.target, records.Shape):
+        return f"radiance {along} from far away, on the mean over a {sensor.target.kind}"
+    at = "the scene" if sensor.target is None else _point(sensor.target)
+    return f"radiance {along} from far away, towards {at}"
 
 
 def _filter(rfilter: records.ReconstructionFilter) -> str:

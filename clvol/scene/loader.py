@@ -54,6 +54,8 @@ PLUGINS: PluginTable = {
         "perspective": sensor.perspective,
         "thinlens": sensor.thinlens,
         "orthographic": sensor.orthographic,
+        "radiancemeter": sensor.radiancemeter,
+        "distant": sensor.distant,
         "batch": sensor.batch,
     },
     "film": {"hdrfilm": sensor.hdrfilm},

@@ -83,8 +83,9 @@ def _sensor(sensor: records.Sensor, seen: set[int]) -> Found:
         yield "to_world", _field(camera, "to_world", values.matrix(values.invertible), values.frozen)
     else:
         yield "to_world", _field(camera, "to_world", values.matrix(values.rigid), values.frozen)
+    if isinstance(camera, records.Perspective):
         yield from _perspective(camera, film)
-    for name in ("near_clip", "far_clip"):
+    for name in ("near_clip", "far_clip") if not isinstance(camera, records.Meter) else ():
         yield name, _field(camera, name, values.number(0.0, exclusive=True))
     yield from _film(film)
     if camera.medium is not None:

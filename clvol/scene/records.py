@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from clvol.scene.films import Film as Film
+from clvol.scene.films import ReconstructionFilter as ReconstructionFilter
+from clvol.scene.films import Sampler as Sampler
 from clvol.scene.kept import Kept
 from clvol.scene.materials import Bsdf, Null
 
@@ -33,52 +36,6 @@ def as_spectrum(value: float | Iterable[float]) -> Spectrum:
     if components.size not in (1, 3):
         raise ValueError(f"a spectrum has one or three components, got {components.size}")
     return tuple(components.tolist())
-
-
-@dataclass(frozen=True)
-class ReconstructionFilter:
-    """Pixel filter; `radius` and `stddev` in pixels (stddev only for the Gaussian)."""
-
-    kind: str = "gaussian"  # "box" | "tent" | "gaussian" | "mitchell" | "lanczos"
-    radius: float = 2.0
-    stddev: float = 0.5
-    b: float = 1 / 3  # of mitchell
-    c: float = 1 / 3
-
-    @property
-    def signed(self) -> bool:
-        """Whether it may be negative somewhere."""
-        return self.kind in ("mitchell", "lanczos")
-
-
-@dataclass(frozen=True)
-class Film:
-    """Image size in pixels and the filter each pixel is integrated with.
-
-    `crop` (x, y, width, height): the part of it that is rendered; None: all.
-    `pixel_format`: "rgb", or "rgba" for a picture with alpha.
-    `backdrop`: radiance that is seen instead of the environment behind all there is; None: the environment.
-    `component_format`: what colours are in files that hold such, "float16" or "float32"; None: what is usual.
-    """
-
-    width: int = 768
-    height: int = 576
-    rfilter: ReconstructionFilter = ReconstructionFilter()
-    sample_border: bool = False
-    crop: tuple[int, int, int, int] | None = None
-    pixel_format: str = "rgb"
-    backdrop: Spectrum | None = None
-    component_format: str | None = None
-
-    @property
-    def has_alpha(self) -> bool:
-        """Whether pictures have alpha."""
-        return self.pixel_format == "rgba"
-
-    @property
-    def window(self) -> tuple[int, int, int, int]:
-        """x, y, width and height of what is rendered."""
-        return self.crop or (0, 0, self.width, self.height)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +89,22 @@ class Orthographic:
         return along
 
 
-Camera = Perspective | Orthographic
+@dataclass(frozen=True, eq=False)
+class Meter:
+    """Rays along local +z of a rigid `to_world`, whose mean is a picture of one pixel.
+
+    They start at its origin, or if `distant` outside of all there is: on their way to the `target`, which is
+    a point (float64 (3,)), any place on a rectangle or disk, or without one on a section of the scene.
+    `medium`: as of the others.
+    """
+
+    to_world: np.ndarray
+    distant: bool = False
+    target: np.ndarray | Shape | None = None
+    medium: Medium | None = None
+
+
+Camera = Perspective | Orthographic | Meter
 
 
 @dataclass(frozen=True, eq=False)
@@ -389,14 +361,6 @@ class Integrator:
     hide_emitters: bool = False
     choices: dict[str, str] = field(default_factory=dict)
     aovs: tuple[str, ...] = ()  # pictures that are made beside the image, whoever asks
-
-
-@dataclass(frozen=True)
-class Sampler:
-    """Samples per pixel and seed."""
-
-    spp: int = 4
-    seed: int = 0
 
 
 @dataclass(frozen=True, eq=False)

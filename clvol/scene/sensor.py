@@ -9,7 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.scene.reader import BRIGHTEST
-from clvol.scene.records import Camera, Film, Orthographic, Perspective, ReconstructionFilter, Sampler, Sensor
+from clvol.scene.records import (
+    Camera,
+    Film,
+    Meter,
+    Orthographic,
+    Perspective,
+    ReconstructionFilter,
+    Sampler,
+    Sensor,
+    Shape,
+)
+from clvol.scene.transforms import frame, translate
 
 if TYPE_CHECKING:
     from clvol.scene.reader import Reader
@@ -51,6 +62,64 @@ def orthographic(reader: Reader) -> Sensor:
     """The `orthographic` plugin: parallel rays; `to_world` scales the film, which is 2 wide without."""
     reader.ignore(focus_distance=float)
     return _sensor(reader, Orthographic(reader.transform(), *_clip(reader)))
+
+
+def radiancemeter(reader: Reader) -> Sensor:
+    """The `radiancemeter` plugin: one ray, of `origin` and `direction` or local +z of `to_world`."""
+    if reader.has("to_world"):
+        to_world = _rigid(reader)
+        for name in ("origin", "direction"):
+            if reader.has(name):
+                reader.vector(name, (0.0, 0.0, 0.0))
+                reader.approximated("not given: to_world says it, as in Mitsuba", name)
+    elif reader.has("origin") != reader.has("direction"):
+        given = "origin" if reader.has("origin") else "direction"
+        reader.fail("origin and direction of a radiancemeter go together", given)
+    else:
+        to_world = translate(reader.vector("origin", (0.0, 0.0, 0.0))) @ _along(reader)
+    return _meter(reader, Meter(to_world))
+
+
+def distant(reader: Reader) -> Sensor:
+    """The `distant` plugin: what leaves the scene against a direction, on the mean over a `target`."""
+    if reader.has("direction") and reader.has("to_world"):
+        reader.fail("give either direction or to_world, not both", "to_world")
+    to_world = _rigid(reader) if reader.has("to_world") else _along(reader)
+    target: np.ndarray | Shape | None = None
+    shapes = reader.children("shape", "target")
+    if shapes:
+        target = reader.build(shapes[0][1])
+        if not isinstance(target, Shape) or target.kind not in ("rectangle", "disk"):
+            kind = shapes[0][1].type
+            reader.unsupported(f"a {kind} as the target of a distant sensor", "target", "take a rectangle")
+    elif reader.has("target"):
+        target = reader.vector("target", (0.0, 0.0, 0.0))
+    if reader.only_child("medium"):
+        what = "a distant sensor starts outside of all shapes, and takes no medium"
+        reader.unsupported(what, reader.children("medium")[0][0])
+    return _meter(reader, Meter(to_world, True, target))
+
+
+def _along(reader: Reader) -> np.ndarray:
+    """A turn that takes local +z to `direction`, which is +z without."""
+    direction = reader.vector("direction", (0.0, 0.0, 1.0))
+    length = np.linalg.norm(direction)
+    if length == 0:
+        reader.fail("direction is zero", "direction")
+    return frame(direction / length)
+
+
+def _meter(reader: Reader, meter: Meter) -> Sensor:
+    """`meter` with its film, of one pixel; filters make no difference there."""
+    sensor = _sensor(reader, meter)
+    width, height = sensor.film.width, sensor.film.height
+    if (width, height) != (1, 1):
+        reader.fail(
+            f"the film of a {reader.type} has 1 x 1 pixels, not {width} x {height}",
+            next((name for name, _ in reader.children("film")), ""),
+            "give its film a width and a height of 1",
+        )
+    return replace(sensor, film=replace(sensor.film, rfilter=ReconstructionFilter("box", 0.5, 0.0)))
 
 
 def _clip(reader: Reader) -> tuple[float, float]:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 LATER: dict[str, tuple[str, ...]] = {
     "integrator": ("depth", "stokes", "volprim_rf_basic", "multichannel", "vrl", "vpl", "ao"),
-    "sensor": ("radiancemeter", "irradiancemeter", "distant"),
+    "sensor": ("irradiancemeter",),
     "film": ("specfilm",),
     "shape": (
         *("bsplinecurve", "linearcurve", "sdfgrid"),

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.scene.records import Orthographic
+from clvol.scene.records import Meter, Orthographic, Shape
 from clvol.scene.sensor import field_of_view_x
 
 if TYPE_CHECKING:
@@ -78,9 +78,47 @@ def camera_rays(sensor: Camera, film: Film, centre: np.ndarray, radius: float) -
 
     What is seen is that of the whole film; a crop cuts its window out of it.
     """
+    if isinstance(sensor, Meter):
+        return _meter_rays(sensor, centre, radius)
     if isinstance(sensor, Orthographic):
         return _parallel_rays(sensor, film, centre, radius)
     return _perspective_rays(sensor, film, centre, radius)
+
+
+def _meter_rays(sensor: Meter, centre: np.ndarray, radius: float) -> CameraRays:
+    """All along one line, over a rectangle by the place in the pixel, or over a disk by that on the lens."""
+    forward, nothing = sensor.to_world[:3, 2], np.zeros(3)
+    eye = sensor.to_world[:3, 3] - centre
+    dx = dy = lens_x = lens_y = nothing
+    if not sensor.distant:
+        position = eye + max(0.0, float(-eye @ forward) - radius) * forward
+    elif isinstance(sensor.target, Shape):
+        middle, (x, y) = sensor.target.to_world[:3, 3] - centre, sensor.target.to_world[:3, :2].T
+        eye = position = middle - 2 * radius * forward
+        if sensor.target.kind == "disk":
+            lens_x, lens_y = x, y
+        else:
+            dx, dy = 2 * x, 2 * y
+            position = position - x - y
+    elif sensor.target is not None:
+        eye = position = sensor.target - centre - 2 * radius * forward
+    else:
+        eye = position = -radius * forward
+        lens_x, lens_y = radius * sensor.to_world[:3, :2].T
+    return CameraRays(
+        *(eye, position, dx, dy, forward, nothing, nothing, forward, np.inf),
+        *(lens_x, lens_y, 1.0, 0.0),
+        parallel=True,
+    )
+
+
+def reach_of(sensor: Camera, radius: float, everywhere: bool) -> float:
+    """How far rays may meet something, of a scene of such a radius, where a medium may be everywhere.
+
+    Distant sensors look at the scene's sphere, whatever is beyond.
+    """
+    distant = isinstance(sensor, Meter) and sensor.distant
+    return np.inf if everywhere and not distant else radius
 
 
 def _parallel_rays(sensor: Orthographic, film: Film, centre: np.ndarray, radius: float) -> CameraRays:

@@ -56,7 +56,7 @@ class Subject:
     def __post_init__(self) -> None:
         seen = viewed(self.scene, self.sensor)
         if not isinstance(seen.sensor, Perspective):
-            what = f"the viewer moves perspective cameras, and sensor {self.sensor} is orthographic"
+            what = f"the viewer moves perspective cameras, and sensor {self.sensor} is another"
             raise OptionError(what, self.scene.source, "render it, or add a perspective sensor")
         if not any(self.size):
             self.size = seen.film.window[2:]

@@ -67,6 +67,13 @@ CAMERA = {
     "medium": {"type": "homogeneous"},
     **SHUTTER,
 }
+PIXEL = {"type": "hdrfilm", "width": 1, "height": 1}
+METER = {
+    "film": PIXEL | {"pixel_format": "rgba"},
+    "sampler": {"type": "independent", "seed": 7},
+    "medium": {"type": "homogeneous"},
+    **SHUTTER,
+}
 LIGHT = {"sampling_weight": Silent(2.0), "medium": Silent({"type": "homogeneous"})}
 SHAPE = {
     "to_world": MOVED,
@@ -155,6 +162,15 @@ PARAMETERS = {
         {},
         {name: CAMERA[name] for name in ("near_clip", "far_clip", "film", "sampler", "medium")}
         | {"to_world": np.diag([2.0, 1.0, 1.0, 1.0]), "focus_distance": Silent(2.0), **SHUTTER},
+    ),
+    "radiancemeter": (
+        {"film": PIXEL, "origin": [0, 0, 0], "direction": [0, 0, 1]},
+        {"origin": [1, 2, 3], "direction": [1, 2, 3], **METER},
+    ),
+    "distant": (
+        {"film": PIXEL, "direction": [0, 0, 1]},
+        {name: METER[name] for name in ("film", "sampler", *SHUTTER)}
+        | {"direction": [1, 2, 3], "target": [1, 2, 3]},
     ),
     "batch": (
         {"inner": {"type": "perspective", "fov": 40.0}},
@@ -355,6 +371,9 @@ PARAMETERS = {
 INSTEAD = {
     ("perspective", "focal_length"): ({}, "85mm"),
     ("thinlens", "focal_length"): ({"aperture_radius": 0.1}, "85mm"),
+    ("radiancemeter", "to_world"): ({"film": PIXEL}, MOVED),
+    ("distant", "to_world"): ({"film": PIXEL}, TURNED),
+    ("distant", "target"): ({"film": PIXEL}, {"type": "rectangle"}),
     ("hdrfilm", "crop_offset_x"): ({"crop_width": 4}, 1),
     ("hdrfilm", "crop_offset_y"): ({"crop_height": 4}, 1),
     ("conductor", "eta"): ({}, RGB),

@@ -141,6 +141,16 @@ def test_both_render_the_same_picture(folder, mitsuba, record_property, name):
 
 
 @pytest.mark.mitsuba
+@pytest.mark.parametrize("meter", ["distant", "radiancemeter"])
+def test_sensors_of_one_pixel_measure_the_same(folder, mitsuba, meter):
+    theirs, result = both(folder, mitsuba, "meter", {"meter": meter}, 16384, 1 << 17)
+    rounding = ROUNDING * theirs.mean()
+    t, freedom, error = welch(theirs[:, 0, 0], result.image[0, 0], result.variance[0, 0], rounding)
+    assert not deviating(t, freedom, FALSE_ALARM)
+    assert (stats.t.isf(FALSE_ALARM / 6, freedom) * error < BIAS * theirs.mean()).all()
+
+
+@pytest.mark.mitsuba
 def test_a_picture_that_lacks_its_last_two_bounces_is_noticed(folder, mitsuba):
     theirs, result = both(folder, mitsuba, "passages", {"depth": 5}, 16, 512, {"depth": 3})
     found, _ = compare(theirs, result, sidak(FALSE_ALARM, len(PICTURES)))
@@ -150,6 +160,7 @@ def test_a_picture_that_lacks_its_last_two_bounces_is_noticed(folder, mitsuba):
 def test_the_scenes_have_every_plugin_that_both_programs_know():
     text = "".join(scene.read_text() for scene in mitsuba_scenes.SCENES)
     used = set(re.findall(r'(?:type|name="integrator" value)="(\w+)"', text))
+    used |= {"distant", "radiancemeter"}  # $meter
     used |= {value for _, defaults, *_ in PICTURES.values() for value in defaults.values()}
     taken_as_others = {*integrator.OTHERS, *integrator.WRAPPERS, *sensor.OTHER_SAMPLERS, "aov", "batch"}
     known = {name for plugins in PLUGINS.values() for name in plugins}

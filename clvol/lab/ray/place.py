@@ -12,7 +12,7 @@ from clvol.scene.boundaries import entry_bounds
 from clvol.scene.material_facts import is_transmissive, passes_light
 from clvol.scene.materials import Null
 from clvol.tables.apart import peak_extinction
-from clvol.tables.camera import CameraRays, camera_rays
+from clvol.tables.camera import CameraRays, camera_rays, reach_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -105,7 +105,8 @@ def find_places(kernels: RayKernels, x: int, y: int) -> list[Place]:
 def _camera_rays(prepared: PreparedScene) -> CameraRays:
     everywhere = any(entry.everywhere for entry in prepared.boundaries.entries)
     scene = prepared.scene
-    return camera_rays(scene.sensor, scene.film, prepared.centre, np.inf if everywhere else prepared.radius)
+    reach = reach_of(scene.sensor, prepared.radius, everywhere)
+    return camera_rays(scene.sensor, scene.film, prepared.centre, reach)
 
 
 def _segments(prepared: PreparedScene, hits: np.ndarray, spans: np.ndarray, far: float) -> Iterator[_Segment]:
