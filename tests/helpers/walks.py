@@ -14,7 +14,7 @@ SCALES = {"constant": 1.5, "ramp": 2.0, "sparse": 25.0, "vacuum": 1.0}
 BINS = 40
 
 RAY_BODY = """
-    const uint4 k = philox4x32((uint4)(i, 0u, 0u, 0u), (uint2)(%d, 77));
+    const uint4 k = philox4x32((uint4)(i, 0u, 0u, 0u), (uint2)((uint)in0[8], 77u));
     Stream stream = stream_begin(k.z, k.w);
     Tally tally = {0, 0, 0, 0, 0, 0, 0.0f};
     Ray ray;
@@ -97,10 +97,10 @@ def headers_of(plan, family):
     return [*chosen, f"tracking/{analytic}.h", "stages/medium_ray.h"]
 
 
-def record_of(probe, ray, length, channel=0):
-    """The ray as the bodies above read it."""
+def record_of(probe, ray, length, channel=0, seed=1):
+    """The ray as the bodies above read it, and the seed: a number in their text would be a kernel more."""
     origin, direction = ray
-    return np.array([*(origin - probe.prepared.centre), *direction, length, channel], np.float32)
+    return np.array([*(origin - probe.prepared.centre), *direction, length, channel, seed], np.float32)
 
 
 def sample_walks(probe, ray, length, walks, seed=1, channel=0):
@@ -113,9 +113,9 @@ def sample_walks(probe, ray, length, walks, seed=1, channel=0):
         np.empty(walks, u),
         np.empty((walks, n), np.float32),
     )
-    record = record_of(probe, ray, length, channel)
+    record = record_of(probe, ray, length, channel, seed)
     t, weights, flaws, lookups, emission = probe.run(
-        headers_of(probe.plan, "technique"), COLLISION_BODY % seed, out, [record]
+        headers_of(probe.plan, "technique"), COLLISION_BODY, out, [record]
     )
     return t, weights, emission, flaws, lookups
 
@@ -127,8 +127,8 @@ def transmittance_walks(probe, ray, length, walks, seed=1, channel=0):
         np.empty(walks, np.uint32),
         np.empty(walks, np.uint32),
     )
-    record = record_of(probe, ray, length, channel)
-    return probe.run(headers_of(probe.plan, "transmittance"), TRANSMITTANCE_BODY % seed, out, [record])
+    record = record_of(probe, ray, length, channel, seed)
+    return probe.run(headers_of(probe.plan, "transmittance"), TRANSMITTANCE_BODY, out, [record])
 
 
 def bin_edges(tau, length):

@@ -279,6 +279,7 @@ def parameters_of(scene: clvol.Scene, name: str) -> Any:
     return clvol.traverse(scene)[name]
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_ends_the_command() -> None:
     command = [sys.executable, "-m", "clvol", "view", SLAB, "--size", "64x64", "--no-browser"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
