@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyopencl as cl
 
-from clvol import layout
-
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from clvol.device.device import Device
 
@@ -28,22 +26,22 @@ def set_arguments(kernel: cl.Kernel, *values: Any) -> None:
 
 
 def scene_arguments(
-    macros: Mapping[str, int],
+    names: Iterable[str],
     buffers: Mapping[str, cl.Buffer],
     slot_stride: int,
     unused: cl.Buffer | None = None,
 ) -> list[Any]:
-    """What every kernel of a plan takes first (CLVOL_ARGUMENTS), in order.
+    """What a kernel takes of the scene, by name (clvol.device.programs.arguments_of).
 
     unused
         Stands for buffers that are not there; None: KeyError.
     """
     found: list[Any] = []
-    for argument in layout.arguments(macros):
-        if argument.name == "slot_stride":
+    for name in names:
+        if name == "slot_stride":
             found.append(np.uint32(slot_stride))
         else:
-            found.append(buffers[argument.name] if unused is None else buffers.get(argument.name, unused))
+            found.append(buffers[name] if unused is None else buffers.get(name, unused))
     return found
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from contextlib import suppress
-from functools import cache
+from functools import cache, partial
 from importlib import resources
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -24,13 +24,16 @@ from clvol.errors import DeviceError
 from clvol.planning.lanes import widths
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from clvol.device.device import Device
     from clvol.layout.stages import Stage
     from clvol.planning.plan import Plan
 
 LAYOUT, CONTRACT = "layout", "contract"
+_LAYOUT_PLACE = "CLVOL_LAYOUT"
+"""Stands for the layout until the rest of a unit is known."""
+_ARGUMENTS = re.compile(r"^#define CLVOL_ARGUMENTS (.*)$", re.MULTILINE)
 SHARED = {
     "CLVOL_SHARED_HEADER": "layout, shared",
     "CLVOL_BSDFS_HEADER": "layout, kinds of BSDF",
@@ -52,18 +55,27 @@ def kernel_source(name: str) -> str:
     return folder.joinpath(name).read_text(encoding="utf-8")
 
 
+def _nothing(_unit: str) -> str:
+    return ""
+
+
 def expand(
-    text: str, macros: Mapping[str, int], slots: Mapping[str, str], layout_text: str, contract: str = ""
+    text: str,
+    macros: Mapping[str, int],
+    slots: Mapping[str, str],
+    layout_of: Callable[[str], str] = _nothing,
+    contract: str = "",
 ) -> str:
     """A translation unit of `text` and all that it includes.
 
-    `layout_text` stands in core/scene.h, and `contract` in path/transitions.h.
+    What `layout_of` says of the unit stands in core/scene.h, and `contract` in path/transitions.h.
 
     Only the macros that occur in it are defined: caches are keyed on the text, and stages that a choice
     does not touch are not built again.
     """
     shared = layout.shared_text(), layout.kinds_text("BSDF"), layout.kinds_text("PHASE")
-    generated = {LAYOUT: layout_text, CONTRACT: contract} | dict(zip(SHARED.values(), shared, strict=True))
+    generated = dict(zip(SHARED.values(), shared, strict=True))
+    generated |= {LAYOUT: f"{_LAYOUT_PLACE}\n", CONTRACT: contract}
 
     def read(name: str) -> str:
         return generated[name] if name in generated else kernel_source(name)
@@ -71,6 +83,8 @@ def expand(
     slots = {**slots, **SHARED, "CLVOL_LAYOUT_HEADER": LAYOUT, "CLVOL_CONTRACT_HEADER": CONTRACT}
     expanded = Preprocessor(read, macros, slots).expand(text, "unit")
     body = "\n".join(expanded) + "\n"
+    if f"\n{_LAYOUT_PLACE}\n" in body:
+        body = body.replace(f"{_LAYOUT_PLACE}\n", layout_of(body))
     used = set(_MACRO.findall(body))
     defines = [f"#define {name} {value}\n" for name, value in macros.items() if name in used]
     return "/* Composed by clvol. */\n" + "".join(defines) + body
@@ -83,10 +97,10 @@ def compose(
     stage: Stage | None = None,
 ) -> str:
     """The translation unit of `text` for a plan, and more macros; `stage`: whose contract holds."""
-    layout_text = layout.layout_text(plan.macros, stage)
     contract = layout.stage_text(plan.macros, stage) if stage else ""
     slots = {f"CLVOL_{family.upper()}_HEADER": header for family, header in plan.slots.items()}
-    return expand(text, {**plan.macros, **macros}, slots, layout_text, contract)
+    layout_of = partial(layout.layout_text, plan.macros, stage)
+    return expand(text, {**plan.macros, **macros}, slots, layout_of, contract)
 
 
 def stage_source(plan: Plan, stage: str) -> str:
@@ -103,6 +117,12 @@ def stage_source(plan: Plan, stage: str) -> str:
 def light_cache_source(plan: Plan) -> str:
     """The composed source of the kernels that fill the cache of lights."""
     return compose(plan, '#include "kernels/light_cache.cl"\n')
+
+
+def arguments_of(source: str) -> list[str]:
+    """Names of what a unit's kernels take of the scene (CLVOL_ARGUMENTS), in order."""
+    found = _ARGUMENTS.search(source)
+    return [argument.split()[-1].removesuffix("_") for argument in found[1].split(", ")] if found else []
 
 
 def build(device: Device, source: str, name: str) -> cl.Program:

@@ -66,9 +66,11 @@ ARGUMENTS = (
     Argument("filter_cdf", "__global const float *", "CLVOL_HAS_FILTER_TABLE"),
 )
 """State and queues first, then what the scene holds."""
+ALWAYS = "render"
+"""The argument that kernels have even where they use nothing of a scene."""
 
 
 def arguments(macros: Macros) -> list[Argument]:
-    """Arguments of every stage kernel, in order."""
+    """What a scene's kernels may have as arguments, in order."""
     known = {**macros, "CLVOL_RESULT_COUNTS": counts_per_path(macros)}
     return [argument for argument in ARGUMENTS if not argument.needs or known[argument.needs]]

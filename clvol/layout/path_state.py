@@ -111,18 +111,12 @@ PATH_STATE: tuple[Declared, ...] = (
     _count("real", "CLVOL_HAS_MEDIA"),
     _count("cells", _WALKS),
     _count("violations", _WALKS),
-    _count("shadow_rays", _NEE),
-    Declared(
-        "sample_weight",
-        "f",
-        "what the pixel filter multiplies the result by",
-        ("CLVOL_HAS_SIGNED_FILTER",),
-        absent="1.0f",
-    ),
-    Declared("channel", "u", "the one channel this path follows", ("CLVOL_ONE_CHANNEL_PER_PATH",)),
-    Declared("pdf", "f", "density of the last direction; 0 where MIS does not apply", ("CLVOL_MIS",)),
-    Declared("medium", "i", "medium of the collision", ("CLVOL_HAS_MANY_MEDIA",)),
+    Declared("largest_weight", "f", "largest weight of the path or the slot", ("CLVOL_HAS_MEDIA",)),
     *_legs("", _WALKS),
+    Declared(
+        "exhausted", "u", "statistics of the slot: walks ended by a loop's bound", ("CLVOL_HAS_LONG_WALKS",)
+    ),
+    Declared("medium", "i", "medium of the collision", ("CLVOL_HAS_MANY_MEDIA",)),
     Declared(
         "medium_end",
         "f",
@@ -151,12 +145,22 @@ PATH_STATE: tuple[Declared, ...] = (
     ),
     Declared("inside", "u", "a bit for each boundary the path is inside of", times="CLVOL_BOUNDARY_WORDS"),
     Declared(
+        "sample_weight",
+        "f",
+        "what the pixel filter multiplies the result by",
+        ("CLVOL_HAS_SIGNED_FILTER",),
+        absent="1.0f",
+    ),
+    Declared("channel", "u", "the one channel this path follows", ("CLVOL_ONE_CHANNEL_PER_PATH",)),
+    Declared("pdf", "f", "density of the last direction; 0 where MIS does not apply", ("CLVOL_MIS",)),
+    Declared(
         "eta_squared",
         "f",
         "squared index of what the path is in, for roulette",
         ("CLVOL_HAS_TRANSMISSION",),
         absent="1.0f",
     ),
+    _count("shadow_rays", _NEE),
     Declared("shadow_direction", "f", "direction to the light", (_NEE,), parts=XYZ),
     Declared(
         "shadow_distance",
@@ -207,14 +211,11 @@ PATH_STATE: tuple[Declared, ...] = (
     Declared(ALPHA, "f", "1 less the weight with which the path has left unscattered", ("CLVOL_HAS_ALPHA",)),
     Declared("cut", "u", "statistics of the slot: paths ended by max_depth", ("CLVOL_HAS_MAX_DEPTH",)),
     Declared("cut_energy", "f", "statistics of the slot: weight of those paths", ("CLVOL_HAS_MAX_DEPTH",)),
-    Declared("largest_weight", "f", "largest weight of the path or the slot", ("CLVOL_HAS_MEDIA",)),
     Declared("lane_steps", "u", "statistics of the slot: steps of lanes, idle or not", ("CLVOL_HAS_LANES",)),
     Declared("busy_lane_steps", "u", "statistics of the slot: of lanes that walked", ("CLVOL_HAS_LANES",)),
-    Declared(
-        "exhausted", "u", "statistics of the slot: walks ended by a loop's bound", ("CLVOL_HAS_LONG_WALKS",)
-    ),
 )
-"""In the order in which a slot holds them."""
+"""In the order in which a slot holds them.  What fewer scenes have comes later: units that do not use it then
+agree on the places of the others, and are built once."""
 _COUNTS = [declared for declared in PATH_STATE if declared.name in COUNTS]
 _FIRST_HITS = [
     *(declared for name in FIRST_HIT for declared in _first_hit(name)),

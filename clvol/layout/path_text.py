@@ -100,17 +100,18 @@ def state_traffic(macros: Macros, stage: Stage) -> int:
 
 def path_text(macros: Macros, stage: Stage | None) -> list[str]:
     """The functions of the values that a stage's contract names; of all values where there is no stage."""
-    lines = [f"typedef struct {{ uint word[{max(macros['CLVOL_BOUNDARY_WORDS'], 1)}]; }} Inside;"]
+    parts = [f"typedef struct {{ uint word[{max(macros['CLVOL_BOUNDARY_WORDS'], 1)}]; }} Inside;"]
     values = path_values(macros)
     for name, value in values.items():
         reads = stage is None or name in stage.reads
         writes = stage is None or name in stage.writes
-        lines += [f"/* {value.declared.meaning} */"] if reads or writes else []
+        lines = [f"/* {value.declared.meaning} */"]
         lines += [value.reader()] if reads else []
         lines += [value.writer()] if writes else []
+        parts += ["\n".join(lines)] if reads or writes else []
     if stage is None or "job" in stage.writes:  # paths begin and end there
-        lines += [*_counts_text(macros), _first_hit_text(values)]
-    return lines
+        parts += [*_counts_text(macros), _first_hit_text(values)]
+    return parts
 
 
 def _counts_text(macros: Macros) -> list[str]:

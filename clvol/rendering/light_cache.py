@@ -8,7 +8,7 @@ import numpy as np
 import pyopencl as cl
 
 from clvol.device.launch import GROUP, run_kernel, scene_arguments, whole
-from clvol.device.programs import BUILD_OPTIONS, build, light_cache_source
+from clvol.device.programs import BUILD_OPTIONS, arguments_of, build, light_cache_source
 from clvol.device.side_builds import Launch, Unit
 from clvol.errors import option
 from clvol.tables.light_cache import SKY_DIRECTIONS, light_cache_record, rows, typical_radiance
@@ -37,10 +37,11 @@ def light_cache_buffers(
     plan, record = prepared.plan, light_cache_record(prepared)
     cells = int(np.prod(record["size"]))
     count = cells * rows(prepared)
-    program = build(device, light_cache_source(plan), "light_cache")
+    source = light_cache_source(plan)
+    program = build(device, source, "light_cache")
     unused = device.memory.allocate(4, *_PURPOSE)
     known = {**buffers, "light_cache": device.memory.upload(record, *_PURPOSE)}
-    arguments = scene_arguments(plan.macros, known, slot_stride=1, unused=unused)
+    arguments = scene_arguments(arguments_of(source), known, slot_stride=1, unused=unused)
 
     def run(name: str, inputs: list[np.ndarray], outputs: list[np.ndarray]) -> None:
         number = np.uint32(len(outputs[0]))

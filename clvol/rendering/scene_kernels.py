@@ -79,8 +79,9 @@ class SceneKernels:
         `scalars`.  `stage` is whose functions it calls, and whose contract holds.
         """
         source = programs.compose(self.plan, text, macros, stage)
+        names = programs.arguments_of(source)
         with driver_errors(self.device.description):
             kernel = cl.Kernel(programs.build(self.device, source, name), name)
             unused = self.device.memory.allocate(4, "an argument", "")
-            resident = scene_arguments(self.plan.macros, self.buffers, slot_stride=1, unused=unused)
+            resident = scene_arguments(names, self.buffers, slot_stride=1, unused=unused)
             run_kernel(self.device, kernel, count, resident, inputs, outputs, scalars, purpose=self.purpose)

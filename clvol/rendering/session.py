@@ -13,7 +13,7 @@ import numpy as np
 from clvol import layout
 from clvol.base.arguments import check_seed
 from clvol.device.driver import driver_errors
-from clvol.device.programs import build_stages, stage_units
+from clvol.device.programs import arguments_of, build_stages, stage_units
 from clvol.device.side_builds import SideBuilds, Unit
 from clvol.errors import RenderError, option
 from clvol.planning.in_force import warnings
@@ -128,9 +128,10 @@ class Session:
             uploaded = time.perf_counter()
             with timed(profiler, "kernels"):
                 kernels = build_stages(device, units)
+                arguments = {name: arguments_of(unit.source) for name, unit in units.items()}
             built = time.perf_counter()
             with timed(profiler, "pool"):
-                wavefront = Wavefront(device, plan, kernels, buffers, record, slots, profiler)
+                wavefront = Wavefront(device, plan, kernels, arguments, buffers, record, slots, profiler)
             warming = time.perf_counter()
             with timed(profiler, "first launches"):
                 wavefront.warm_up()

@@ -26,7 +26,7 @@ from clvol.rendering.handled import Handled
 from clvol.rendering.profiler import timed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from clvol.device.device import Device
     from clvol.planning.plan import Plan
@@ -78,6 +78,7 @@ class Wavefront:
     Parameters
     ----------
     kernels : stage name to kernel, `accumulate` included.
+    arguments : stage name to what its kernel takes of the scene and the pool, in order.
     buffers : scene buffers by argument name.
     render : the Render record, without its schedule fields.
     profiler : is told of all that goes to the device.
@@ -88,6 +89,7 @@ class Wavefront:
         device: Device,
         plan: Plan,
         kernels: dict[str, cl.Kernel],
+        arguments: Mapping[str, Sequence[str]],
         buffers: dict[str, cl.Buffer],
         render: np.ndarray,
         pool: Pool,
@@ -109,6 +111,8 @@ class Wavefront:
         self.launches = self.waves = 0
         self.handled = Handled(self.groups)
         self._allocate(buffers)
+        for stage in plan.stages:
+            set_arguments(kernels[stage], *scene_arguments(arguments[stage], self.buffers, self.stride))
 
     def _allocate(self, scene_buffers: dict[str, cl.Buffer]) -> None:
         # of fewer pixels a pass may hold more jobs than of all, though not more than this
@@ -136,9 +140,6 @@ class Wavefront:
         self._write("state", state)
         self._write("counters", np.zeros(_DONE + self.ring_passes, np.uint32))
         self._write("queue_lengths", self.handled.all_idle(self.plan.tuning.group_slots))
-        values = scene_arguments(self.plan.macros, self.buffers, self.stride)
-        for stage in self.plan.stages:
-            set_arguments(self.kernels[stage], *values)
         self.list_pixels(None)
 
     def restart(self, seed: tuple[int, int]) -> None:

@@ -96,7 +96,7 @@ def source(kinds, channel=None, textures=True):
     buffers = [f"__global {buffer}" for buffer in (*buffers, "const float *material_tables")]
     scene = "#define SCENE " + ", ".join(f"{buffer}_" for buffer in buffers)
     text = f'#include "bsdf/bsdf.h"\n{scene}\n#define CHANNEL {channel or 0}\n{BODY}'
-    return programs.expand(text, defines, {}, "")
+    return programs.expand(text, defines, {})
 
 
 class Samples:

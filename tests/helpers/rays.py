@@ -50,7 +50,7 @@ def ray_source(stack, triangles=True, quadrics=False, kernels=_KERNELS):
     flags |= {"CLVOL_BVH_STACK": stack}
     flags |= {"CLVOL_HAS_SURFACES": 1}
     text = kernels.replace("ARGUMENTS", _ARGUMENTS).replace("BEGIN", _BEGIN)
-    return programs.expand('#include "geometry/bvh.h"\n' + text, flags, {}, "")
+    return programs.expand('#include "geometry/bvh.h"\n' + text, flags, {})
 
 
 def directions(generator, count):

@@ -130,7 +130,7 @@ def source(present=PRESENT, kernels=KERNELS):
     macros |= {f"CLVOL_HAS_{name}": int(name in present) for name in (*PRESENT, *ABSENT)}
     macros["CLVOL_HAS_SURFACES"] = macros["CLVOL_HAS_AREA"]
     headers = "".join(f'#include "{name}.h"\n' for name in ("core/random", "emitter/area", "emitter/emitter"))
-    return programs.expand(headers + kernels, macros, {}, "")
+    return programs.expand(headers + kernels, macros, {})
 
 
 def rows(matrix):

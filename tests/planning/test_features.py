@@ -407,11 +407,23 @@ def test_a_camera_looks_for_what_it_is_inside_of_only_where_it_may_be(device):
 @pytest.mark.parametrize("name", ["nothing", "everything"])
 def test_composed_sources_of_every_stage_build(device, name):
     plan = plan_of(device, SCENES[name])
-    kernels = programs.build_stages(device, programs.stage_units(plan, groups=1, pixels=1))
+    composed = programs.stage_units(plan, groups=1, pixels=1)
+    kernels = programs.build_stages(device, composed)
     assert tuple(kernels) == (*plan.stages, "accumulate")
     for stage, kernel in kernels.items():
         if stage != "accumulate":
-            assert kernel.num_args == len(layout.arguments(plan.macros))
+            taken = programs.arguments_of(composed[stage].source)
+            assert kernel.num_args == len(taken) and set(taken) <= argument_names(plan)
+
+
+def test_units_are_the_same_for_scenes_that_differ_in_what_a_stage_does_not_use(device):
+    """Each is then built once for all of them."""
+    sky, sun = (plan_of(device, SCENES[f"fog under a {light}"]) for light in ("sky", "sun"))
+    assert sky.macros != sun.macros
+    for stage in ("intersect", "accumulate"):
+        assert programs.stage_source(sky, stage) == programs.stage_source(sun, stage)
+    assert "emitters" not in programs.arguments_of(programs.stage_source(sun, "intersect"))
+    assert "emitters" in programs.arguments_of(programs.stage_source(sun, "shade"))
 
 
 def test_a_unit_is_self_contained_and_names_files_and_lines(device):

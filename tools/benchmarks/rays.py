@@ -104,7 +104,7 @@ class OurSide:
         flags = {"CLVOL_SPECTRUM": 1, "CLVOL_EXTINCTION": 1, "CLVOL_ONE_CHANNEL_PER_PATH": 0}
         flags |= {"CLVOL_HAS_SURFACES": 1, "CLVOL_HAS_TRIANGLES": 1, "CLVOL_HAS_QUADRICS": 0}
         flags["CLVOL_BVH_STACK"] = bvh.stack
-        text = programs.expand('#include "geometry/bvh.h"\n' + KERNEL, flags, {}, "")
+        text = programs.expand('#include "geometry/bvh.h"\n' + KERNEL, flags, {})
         self.device = device
         self.kernel = cl.Kernel(programs.build(device, text, "rays"), "trace")
         self.tree = [device.memory.upload(array, "the hierarchy") for array in (bvh.nodes, bvh.packets)]
