@@ -116,12 +116,16 @@ class Error(Exception):
         super().__init__(self.told())
 
     def told(self, command: bool = False) -> str:
-        """The message in one line, in the words of Python or of the command line."""
+        """The message in one line, in the words of Python or of the command line.
+
+        What files and callers gave may hold anything: it shows as escapes where it would command a terminal.
+        """
         what, where, hint = (
             spelled_out(part, command, self.in_scene, self.longest)
             for part in (self.what, self.where, self.hint)
         )
-        return "; ".join(filter(None, (f"{where}: {what}" if where else what, hint)))
+        text = "; ".join(filter(None, (f"{where}: {what}" if where else what, hint)))
+        return text if self.whole else "\n".join(map(printable, text.split("\n")))
 
     def __str__(self) -> str:
         return self.told()

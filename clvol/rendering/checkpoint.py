@@ -10,6 +10,7 @@ import json
 import logging
 import struct
 import time
+import tokenize
 import zipfile
 import zlib
 from dataclasses import dataclass
@@ -35,8 +36,8 @@ _ABOUT = "about"
 _ARCHIVE = b"PK\x03\x04"
 _HINT = "give another name, or remove the file to begin anew"
 _DAMAGE = (
-    *(OSError, EOFError, KeyError, TypeError, ValueError, AttributeError, MemoryError, SyntaxError),
-    *(NotImplementedError, RuntimeError, struct.error, zlib.error, zipfile.BadZipFile),
+    *(OSError, EOFError, LookupError, TypeError, ValueError, AttributeError, MemoryError, SyntaxError),
+    *(ArithmeticError, RuntimeError, struct.error, zlib.error, zipfile.BadZipFile, tokenize.TokenError),
 )
 """What NumPy and zipfile raise for files that are none."""
 _LARGEST_SHARE = 0.05
@@ -80,7 +81,7 @@ class Saved:
             session.earlier = float(self.spent["seconds"])
             with driver_errors(session.device.description):
                 wavefront.take_up(self.buffers, self.spent)
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
             raise OptionError(f"is damaged ({error!r})", self.path, _HINT) from None
 
 

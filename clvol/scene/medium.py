@@ -139,7 +139,8 @@ def sane(reader: Reader, volume: Volume, signed: bool = False) -> Volume:
 
 def own_volume(reader: Reader, name: str, expected: str) -> Volume:
     """The volume that is parameter `name`; SceneError, with what is `expected`, for anything else."""
-    reader.has(name)
+    if not reader.has(name):
+        reader.fail(f"{reader.kind} '{reader.type}' needs '{name}', {expected}")
     found = reader.children("volume", name)
     if not found:
         reader.refuse_plugin(name, expected)

@@ -314,8 +314,11 @@ class Reader:
             self.unsupported(what, name, hint)
 
     def refuse_plugin(self, name: str, expected: str = "") -> NoReturn:
-        """Raise for the plugin in parameter `name`: not supported here."""
-        inner = self.library.resolve(self.node[name])
+        """Raise for the plugin in parameter `name`, or for the value there: not supported here."""
+        value = self.node[name]
+        if not isinstance(value, Node) or value.is_value:
+            self._wrong(name, expected or "left out", value)
+        inner = self.library.resolve(value)
         takes = f"takes no {self.library.kind_of(inner)} ('{inner.type}')"
         what = f"{self.kind} '{self.type}' {takes}"
         if expected:

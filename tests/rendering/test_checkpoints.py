@@ -141,20 +141,11 @@ def test_files_that_are_none_are_refused_and_stay(tmp_path):
     path = tmp_path / "a.npz"
     clvol.render(scene(), spp=2, checkpoint=path)
     good = path.read_bytes()
-    random = np.random.default_rng(1)
-    broken = [b"", b"PK", good[: len(good) // 2], b"no checkpoint at all"]
-    for _ in range(40):
-        damaged = bytearray(good)
-        for at in random.integers(0, len(good), 4):
-            damaged[at] ^= int(random.integers(1, 256))
-        broken.append(bytes(damaged))
-    for data in broken:
+    for data in (b"", b"PK", good[: len(good) // 2], b"no checkpoint at all"):
         path.write_bytes(data)
-        try:
+        with pytest.raises(clvol.OptionError, match=r"a\.npz: is no checkpoint of clvol, or is damaged"):
             clvol.render(scene(), spp=3, checkpoint=path)
-        except clvol.OptionError as error:
-            assert str(path) in str(error)
-            assert path.read_bytes() == data
+        assert path.read_bytes() == data
     np.savez_compressed(path, about=np.zeros(4, np.uint8))
     with pytest.raises(clvol.OptionError, match="compressed"):
         clvol.render(scene(), spp=3, checkpoint=path)
