@@ -146,7 +146,9 @@ class Order:
             log.info("pilot: %s; %s", ", ".join(f"{k} {v}" for k, v in found.names.items()), found.reason)
             reasons = dict.fromkeys(found.names, "chosen by the pilot")
             plan = plan.having(choices.but(**found.names), reasons)
-        session = Session.for_plan(device, self.scene, plan, self.seed, self.pool, spent, profiler)
+        bounded = self.time_limit is None and choices.target_error is None
+        spp = self.count if bounded else None
+        session = Session.for_plan(device, self.scene, plan, self.seed, self.pool, spent, profiler, spp)
         if self.resumed is not None:
             check_same(Before.of(self.resumed), session)
         if self.saved is not None:

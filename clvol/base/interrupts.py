@@ -69,6 +69,11 @@ class Interrupt:
             signal.signal(number, previous)
         self._previous = {}
 
+    def renew(self) -> None:
+        """Take the signals back that something else has taken to itself."""
+        for number in self._previous:
+            signal.signal(number, self._on_signal)
+
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         self.level += 1
         self.number = self.number or number
@@ -82,6 +87,12 @@ class Interrupt:
 
 
 _held: Interrupt | None = None
+
+
+def renew() -> None:
+    """See that the signals that a block holds still come to it, after code that handles signals itself."""
+    if _held is not None and threading.current_thread() is threading.main_thread():
+        _held.renew()
 
 
 @contextmanager

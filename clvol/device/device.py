@@ -17,7 +17,7 @@ from clvol.device.memory import DeviceMemory
 from clvol.errors import DeviceError, shown
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Hashable
 
 _KINDS = ("GPU", "ACCELERATOR", "CPU")
 _POCL = "Portable Computing Language"
@@ -49,10 +49,12 @@ class Device:
     info: DeviceInfo
     context: cl.Context
     queue: cl.CommandQueue
-    programs: dict[str, cl.Program] = field(default_factory=dict)
-    """Built programs by source: a second render with the same features and choices builds nothing."""
-    building: dict[str, Callable[[], None]] = field(default_factory=dict)
-    """Sources that other processes build (clvol.device.side_builds), and how to wait for each."""
+    programs: dict[Hashable, cl.Program] = field(default_factory=dict)
+    """Built programs by source and options: a second render with the same choices builds nothing."""
+    building: dict[Hashable, Callable[[], None]] = field(default_factory=dict)
+    """What other processes build (clvol.device.side_builds), likewise, and how to wait for each."""
+    samples: dict[str, int] = field(default_factory=dict)
+    """By source: how many were rendered by programs that are not optimised (clvol.device.quick)."""
 
     @cached_property
     def is_cpu(self) -> bool:

@@ -125,19 +125,20 @@ def arguments_of(source: str) -> list[str]:
     return [argument.split()[-1].removesuffix("_") for argument in found[1].split(", ")] if found else []
 
 
-def build(device: Device, source: str, name: str) -> cl.Program:
+def build(device: Device, source: str, name: str, options: tuple[str, ...] = BUILD_OPTIONS) -> cl.Program:
     """Build a unit, once per device and process.
 
     A build that fails raises DeviceError with the log, which names file and line.
     """
-    if source in device.programs:
-        return device.programs[source]
-    if source in device.building:
-        device.building[source]()
+    key = source, options
+    if key in device.programs:
+        return device.programs[key]
+    if key in device.building:
+        device.building[key]()
     program = cl.Program(device.context, source)
     try:
-        device.programs[source] = program.build(options=list(BUILD_OPTIONS))
-        return device.programs[source]
+        device.programs[key] = program.build(options=list(options))
+        return device.programs[key]
     except cl.Error as error:
         log, info = "", cl.program_build_info.LOG
         with suppress(cl.Error):  # a device that is lost has no log
@@ -159,6 +160,6 @@ def stage_units(plan: Plan, groups: int, pixels: int) -> dict[str, Unit]:
 def build_stages(device: Device, units: Mapping[str, Unit]) -> dict[str, cl.Kernel]:
     """One kernel object per unit."""
     return {
-        name: cl.Kernel(build(device, unit.source, name), unit.launches[0].name)
+        name: cl.Kernel(build(device, unit.source, name, unit.options), unit.launches[0].name)
         for name, unit in units.items()
     }

@@ -26,7 +26,7 @@ import pyopencl as cl
 from clvol.device import build_worker, kernel_cache
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Hashable, Iterable
 
     from clvol.device.device import Device
 
@@ -59,6 +59,11 @@ class Unit:
     options: tuple[str, ...]
     launches: tuple[Launch, ...]
 
+    @property
+    def program(self) -> tuple[str, tuple[str, ...]]:
+        """Tells its program from others, wherever it is launched."""
+        return self.source, self.options
+
     def key(self, driver: str) -> str:
         """Names what `driver` builds of it."""
         launches = [f"{launch.name} {launch.group} {launch.size < _SMALL}" for launch in self.launches]
@@ -75,18 +80,18 @@ class SideBuilds:
 
     def __init__(self, device: Device, units: Iterable[Unit]) -> None:
         self._device, self._index = device, _index(device)
-        new = [unit for unit in units if unit.source not in device.programs] if self._index else []
-        driver = f"{device.description} {device.queue.device.driver_version}"
+        new = [unit for unit in units if unit.program not in device.programs] if self._index else []
         known = _known(self._index) if new else set()
+        driver = _driver(device)
         self._missing = {unit: key for unit in new if (key := unit.key(driver)) not in known}
         self._jobs = deque(sorted(self._missing, key=lambda unit: -len(unit.source)))
-        self._built: dict[str, threading.Event] = {}
+        self._built: dict[Hashable, threading.Event] = {}
         self._threads: list[threading.Thread] = []
         self.processes: list[subprocess.Popen[str]] = []
         others = min(len(self._missing), _most(device)) - 1
         if len(self._missing) >= WORTH_IT and others > 0:
-            self._built = {unit.source: threading.Event() for unit in self._missing}
-            device.building.update({source: partial(self.wait, source) for source in self._built})
+            self._built = {unit.program: threading.Event() for unit in self._missing}
+            device.building.update({program: partial(self.wait, program) for program in self._built})
             try:
                 self._start(device, others)
             except BaseException:
@@ -99,8 +104,8 @@ class SideBuilds:
     def __exit__(self, *_: object) -> None:
         """Leave no process behind, whatever happened."""
         self._jobs.clear()
-        for source in self._built:
-            self._device.building.pop(source, None)
+        for program in self._built:
+            self._device.building.pop(program, None)
         for process in self.processes:
             process.kill()
         for process in self.processes:
@@ -113,13 +118,13 @@ class SideBuilds:
                     if pipe:
                         pipe.close()
 
-    def wait(self, source: str) -> None:
-        """Return once a program is built or given up.  Until then this process builds what is left."""
-        built = self._built[source]
+    def wait(self, program: Hashable) -> None:
+        """Return once a unit's program is built or given up.  Until then this process builds what is left."""
+        built = self._built[program]
         while not built.is_set() and (unit := self._next()):
             with suppress(cl.Error):  # said when the program is needed
                 build_worker.build(self._device.queue, **asdict(unit))
-            self._built[unit.source].set()
+            self._built[unit.program].set()
         while not built.wait(_GLANCE) and any(thread.is_alive() for thread in self._threads):
             pass
 
@@ -164,7 +169,7 @@ class SideBuilds:
         """Hand a process one unit after the other, until it ends."""
         while unit := self._next():
             done = _ask(process, place | {"unit": asdict(unit)})
-            self._built[unit.source].set()
+            self._built[unit.program].set()
             if not done:
                 log.debug("a process that builds kernels ended at %s", unit.launches)
                 return
@@ -180,6 +185,16 @@ def _ask(process: subprocess.Popen[str], job: dict[str, object]) -> bool:
         return bool(process.stdout.readline())
     except OSError:
         return False
+
+
+def in_cache(device: Device, units: Iterable[Unit]) -> set[Unit]:
+    """Those that this process has built, or that PoCL's cache has."""
+    known, driver = _known(_index(device)), _driver(device)
+    return {unit for unit in units if unit.program in device.programs or unit.key(driver) in known}
+
+
+def _driver(device: Device) -> str:
+    return f"{device.description} {device.queue.device.driver_version}"
 
 
 def _index(device: Device) -> Path | None:

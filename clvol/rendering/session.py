@@ -14,6 +14,7 @@ from clvol import layout
 from clvol.base.arguments import check_seed
 from clvol.device.driver import driver_errors
 from clvol.device.programs import arguments_of, build_stages, stage_units
+from clvol.device.quick import StageUnits
 from clvol.device.side_builds import SideBuilds, Unit
 from clvol.errors import RenderError, option
 from clvol.planning.in_force import warnings
@@ -85,15 +86,20 @@ class Session:
         pool: int | None = None,
         spent: float = 0.0,
         profiler: Profiler | None = None,
+        spp: int | None = None,
     ) -> Session:
-        """Prepare a scene as planned, and open it; `spent`: seconds that went into the plan."""
+        """Prepare a scene as planned, and open it.
+
+        spent : seconds that went into the plan.
+        spp : how many samples of a pixel will be asked for; None for any number, and to measure times.
+        """
         check_seed(seed)
         started = time.perf_counter()
         with timed(profiler, "volumes and tables"):
             prepared = prepare(scene, plan)
         prepared_after = time.perf_counter() - started
         with driver_errors(device.description):
-            session = cls.open(device, prepared, seed, pool, profiler)
+            session = cls.open(device, prepared, seed, pool, profiler, spp)
         session.setup_seconds += spent + prepared_after
         return session
 
@@ -105,8 +111,9 @@ class Session:
         seed: int,
         pool: int | None = None,
         profiler: Profiler | None = None,
+        spp: int | None = None,
     ) -> Session:
-        """Compose and build the kernels, upload the scene, allocate the pool."""
+        """Compose and build the kernels, upload the scene, allocate the pool; `spp` as in `for_plan`."""
         started = time.perf_counter()
         prepared = on_device(prepared, device)
         plan = prepared.plan
@@ -120,18 +127,21 @@ class Session:
         with timed(profiler, "units"):
             grid = light_cache_record(prepared).tobytes() if plan.light_cache else b""
             key = compiled(plan), groups, pixels, grid
-            units, others = residence.made("units", key, lambda: _units(prepared, groups, pixels))
-        with SideBuilds(device, [*units.values(), *others]) as builds:
+            stages, others = residence.made("units", key, lambda: _units(prepared, groups, pixels))
+            units = StageUnits.of(device, stages, None if profiler or spp is None else spp * pixels)
+        with SideBuilds(device, [*units.now.values(), *others]) as builds:
             uploading = time.perf_counter()
             with timed(profiler, "upload"):
                 buffers = upload_scene(device, prepared, record, residence)
             uploaded = time.perf_counter()
             with timed(profiler, "kernels"):
-                kernels = build_stages(device, units)
-                arguments = {name: arguments_of(unit.source) for name, unit in units.items()}
+                kernels = build_stages(device, units.now)
+                arguments = {name: arguments_of(unit.source) for name, unit in stages.items()}
             built = time.perf_counter()
             with timed(profiler, "pool"):
-                wavefront = Wavefront(device, plan, kernels, arguments, buffers, record, slots, profiler)
+                wavefront = Wavefront(
+                    device, plan, kernels, arguments, buffers, record, slots, profiler, units.when_slow
+                )
             warming = time.perf_counter()
             with timed(profiler, "first launches"):
                 wavefront.warm_up()

@@ -82,6 +82,7 @@ class Wavefront:
     buffers : scene buffers by argument name.
     render : the Render record, without its schedule fields.
     profiler : is told of all that goes to the device.
+    when_slow : asked, with the seconds that the stages took, for kernels to go on with in place of these.
     """
 
     def __init__(
@@ -94,9 +95,11 @@ class Wavefront:
         render: np.ndarray,
         pool: Pool,
         profiler: Profiler | None = None,
+        when_slow: Callable[[float], dict[str, cl.Kernel]] = lambda seconds: {},
     ) -> None:
         self.device, self.plan, self.kernels, self.pool = device, plan, kernels, pool
-        self.profiler = profiler
+        self.profiler, self._when_slow = profiler, when_slow
+        self._arguments = arguments
         self.render = render
         self.pixels = int(render["film_size"][0, 0]) * int(render["film_size"][0, 1])
         self.buffers: dict[str, cl.Buffer] = {}
@@ -111,8 +114,7 @@ class Wavefront:
         self.launches = self.waves = 0
         self.handled = Handled(self.groups)
         self._allocate(buffers)
-        for stage in plan.stages:
-            set_arguments(kernels[stage], *scene_arguments(arguments[stage], self.buffers, self.stride))
+        self._use(kernels)
 
     def _allocate(self, scene_buffers: dict[str, cl.Buffer]) -> None:
         # of fewer pixels a pass may hold more jobs than of all, though not more than this
@@ -141,6 +143,13 @@ class Wavefront:
         self._write("counters", np.zeros(_DONE + self.ring_passes, np.uint32))
         self._write("queue_lengths", self.handled.all_idle(self.plan.tuning.group_slots))
         self.list_pixels(None)
+
+    def _use(self, kernels: dict[str, cl.Kernel]) -> None:
+        """Launch these from now on."""
+        self.kernels = kernels
+        for stage in self.plan.stages:
+            given = scene_arguments(self._arguments[stage], self.buffers, self.stride)
+            set_arguments(kernels[stage], *given)
 
     def restart(self, seed: tuple[int, int]) -> None:
         """Forget every sample and what was counted; the next run draws the random numbers of another seed."""
@@ -233,6 +242,8 @@ class Wavefront:
                 self._allow(sum(samples[:allowed]) * self.sample_jobs)
                 with timed(self.profiler, "waves"):
                     launched, elapsed, counters = self._launch(waves)
+                if others := self._when_slow(sum(self.seconds.values())):
+                    self._use(others)
                 waves = int(np.clip(launched * _BATCH_SECONDS / max(elapsed, 1e-6), 1, max(2 * launched, 4)))
                 if time.perf_counter() - self._harvested > _HARVEST_SECONDS:
                     self._harvest()

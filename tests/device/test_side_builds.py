@@ -51,7 +51,7 @@ def build_twice(device, cache):
     """Processes that were started, kernels and open pipes that they left, and processes for them again."""
     with SideBuilds(device, UNITS) as builds:
         for unit in UNITS:
-            builds.wait(unit.source)
+            builds.wait(unit.program)
         left = len(list(cache.rglob("*.so")))
         builds.remember()
     pipes = [pipe for process in builds.processes for pipe in (process.stdin, process.stdout)]
@@ -92,7 +92,7 @@ def build_wrong(device, cache):
     wrong = Unit("__kernel void k(__global int *a)\n{ a[0] = nowhere; }", (), (Launch("k", 1, 1),))
     with SideBuilds(device, [wrong, *UNITS]) as builds:
         for unit in (wrong, *UNITS):
-            builds.wait(unit.source)
+            builds.wait(unit.program)
         left = len(list(cache.rglob("*.so")))
     try:
         build(device, wrong.source, "k")
@@ -123,7 +123,7 @@ def test_workers_that_end_are_not_waited_for(pocl, worker, text):
     worker(text)
     with SideBuilds(pocl, UNITS) as builds:
         for unit in UNITS:
-            builds.wait(unit.source)
+            builds.wait(unit.program)
     assert len(builds.processes) == 1
 
 
@@ -135,7 +135,7 @@ def test_ctrl_c_leaves_no_process(pocl, worker, ctrl_c):
         with SideBuilds(pocl, UNITS) as builds:
             processes.extend(builds.processes)
             threading.Timer(0.1, signal.raise_signal, [signal.SIGINT]).start()
-            builds.wait(UNITS[0].source)
+            builds.wait(UNITS[0].program)
 
     with pytest.raises(KeyboardInterrupt):
         interrupted()
