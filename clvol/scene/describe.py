@@ -12,7 +12,7 @@ import numpy as np
 from clvol.base.memory import format_bytes
 from clvol.errors import VolumeError
 from clvol.scene import records
-from clvol.scene.materials import Blend, Bsdf, Dielectric, Mask, Null, TwoSided
+from clvol.scene.materials import Blend, Bsdf, Dielectric, FrontOnly, Mask, Null, TwoSided
 from clvol.scene.tabulated import mean_cosine
 from clvol.scene.vocabulary import listed
 from clvol.volumes import GridInfo, read_volume
@@ -227,6 +227,8 @@ def _bsdf(bsdf: Bsdf) -> str:
     match bsdf:
         case Dielectric(thin=True):
             return "thin dielectric"
+        case FrontOnly():
+            return f"{_bsdf(bsdf.front)} from outside"
         case TwoSided():
             back = "" if bsdf.back is bsdf.front else f" and {_bsdf(bsdf.back)}"
             return f"two sided ({_bsdf(bsdf.front)}{back})"

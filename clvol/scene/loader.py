@@ -79,6 +79,7 @@ PLUGINS: PluginTable = {
         "cylinder": shape.cylinder,
         **dict.fromkeys(FORMATS, shape.mesh),
         "mesh": shape.mesh_of_arrays,
+        **dict.fromkeys(("bsplinecurve", "linearcurve"), shape.curve),
         "shapegroup": groups.shapegroup,
         "instance": groups.instance,
         "merge": groups.merge,

@@ -193,6 +193,13 @@ class TwoSided:
 
 
 @dataclass(frozen=True, eq=False)
+class FrontOnly:
+    """`front` seen along the normal's side, and no surface at all from the other."""
+
+    front: Bsdf
+
+
+@dataclass(frozen=True, eq=False)
 class Mask:
     """`nested` where `opacity` is 1, nothing where it is 0, by chance in between."""
 
@@ -221,6 +228,7 @@ Bsdf = (
     | Principled
     | PrincipledThin
     | TwoSided
+    | FrontOnly
     | Mask
     | Blend
 )

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from clvol.errors import SceneError
+from clvol.scene.curves import read_curves
 from clvol.scene.emitter import AreaLight
 from clvol.scene.files import find_parameter
 from clvol.scene.material_facts import has_textures
-from clvol.scene.materials import Diffuse
+from clvol.scene.materials import Diffuse, FrontOnly
 from clvol.scene.mesh_arrays import read_arrays
 from clvol.scene.mesh_attributes import with_attributes
 from clvol.scene.mesh_files import read_mesh
@@ -107,6 +109,18 @@ def mesh_of_arrays(reader: Reader) -> Shape:
     """Our `mesh` plugin: vertices and faces as arrays, by the names that Mitsuba's meshes have for them."""
     read, origin = read_arrays(reader)
     return _shape(reader, "mesh", reader.transform() @ translate(origin), read)
+
+
+def curve(reader: Reader) -> Shape:
+    """The `bsplinecurve` and `linearcurve` plugins, as tubes of triangles (`clvol.scene.curves`).
+
+    From inside they are not there, as in Mitsuba.
+    """
+    read, origin = read_curves(reader, reader.transform())
+    made = _shape(reader, "mesh", translate(origin), read)
+    for name, _ in reader.children("medium"):
+        reader.unsupported("curves bound no media: their ends are open", name)
+    return replace(made, bsdf=FrontOnly(made.bsdf))
 
 
 def trianglemesh(reader: Reader) -> Shape:

@@ -14,6 +14,7 @@ from clvol.scene.materials import (
     Conductor,
     Dielectric,
     Diffuse,
+    FrontOnly,
     Mask,
     Null,
     Plastic,
@@ -94,6 +95,8 @@ def bsdf_sides(bsdf: Bsdf) -> tuple[Look | None, Look | None]:
             if side and (side.opacities or BSDF_FACTS[side_kind(side.bsdf)].transmits):
                 raise ValueError("a two-sided BSDF takes no BSDF that light passes")
         return front, back
+    if isinstance(bsdf, FrontOnly):
+        return bsdf_sides(bsdf.front)[0], Side(Null())
     if isinstance(bsdf, Blend):
         first, second = bsdf_sides(bsdf.first), bsdf_sides(bsdf.second)
         return _mixed(first[0], second[0], bsdf.weight), _mixed(first[1], second[1], bsdf.weight)

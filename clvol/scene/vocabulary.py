@@ -18,10 +18,7 @@ LATER: dict[str, tuple[str, ...]] = {
     "integrator": ("depth", "stokes", "volprim_rf_basic", "multichannel", "vrl", "vpl", "ao"),
     "sensor": ("irradiancemeter",),
     "film": ("specfilm",),
-    "shape": (
-        *("bsplinecurve", "linearcurve", "sdfgrid"),
-        *("ellipsoids", "heightfield"),
-    ),
+    "shape": ("sdfgrid", "ellipsoids", "ellipsoidsmesh", "heightfield"),
     "bsdf": (
         *("bumpmap", "normalmap", "measured", "measured_polarized", "hair"),
         *("pplastic", "polarizer", "retarder", "circular"),

@@ -17,6 +17,20 @@ from clvol.volumes import write_vol
 SCENES = sorted((Path(__file__).parents[1] / "mitsuba").glob("*.xml"))
 
 
+STRANDS = """-2.2 -0.5 0 0.1
+-1.2 0.3 0 0.25
+0 0.9 0.5 0.2
+1.2 0.3 0 0.15
+2 -0.4 0 0.1
+2.5 0.5 0 0.1
+
+-1 -0.5 0.5 0.1
+0.6 -0.5 0.5 0.1
+1 0.1 0.5 0.1
+-1 -0.4 0.5 0.2
+"""
+
+
 def write_files(folder):
     """Writes everything that the scenes read, and the scenes."""
     rng = np.random.default_rng(1)
@@ -30,6 +44,7 @@ def write_files(folder):
     write_vol(folder / "albedo.vol", rng.uniform(0.4, 1, (4, 4, 4, 3)).astype(np.float32), unit)
     write_vol(folder / "colours.vol", rng.uniform(0, 1, (3, 4, 5, 3)).astype(np.float32), unit)
     (folder / "smooth.ply").write_bytes(_smooth_ply())
+    (folder / "strands.txt").write_text(STRANDS)
     (folder / "painted.ply").write_bytes(_painted_ply())
     (folder / "cup.obj").write_text(_cup_obj())
     (folder / "pair.serialized").write_bytes(_pair())

@@ -85,6 +85,8 @@ SHAPE = {
     "silhouette_sampling_weight": Silent(2.0),
     "vertex_a": Silent(TEXTURE),  # for mesh_attribute textures
 }
+STRANDS = {name: value for name, value in SHAPE.items() if name not in ("interior", "exterior")}
+STRANDS["filename"] = "b.txt"
 MESH = SHAPE | {"face_normals": True}
 DIELECTRIC = {
     "int_ior": 1.7,
@@ -239,6 +241,7 @@ PARAMETERS = {
         | {"vertex_positions": 2 * CORNERS, "faces": FACES[:2]}
         | {"vertex_normals": CORNERS + 1, "vertex_texcoords": CORNERS[:, :2]},
     ),
+    **{name: ({"filename": "a.txt"}, STRANDS) for name in ("bsplinecurve", "linearcurve")},
     "null": ({}, {}),
     "diffuse": ({}, {"reflectance": TEXTURE}),
     "dielectric": ({}, DIELECTRIC),

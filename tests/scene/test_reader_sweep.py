@@ -51,6 +51,7 @@ def files(tmp_path_factory):
             one, two = (serialized_mesh(scale * ball.vertices, ball.faces) for scale in (1, 3))
             (folder / f"{name}.serialized").write_bytes(serialized(one, two))
             ball.export(folder / f"{name}.stl")
+            (folder / f"{name}.txt").write_text("".join(f"{x} 0 0 {radius}\n" for x in (0, 3, 6, 9)))
             ball.export(folder / f"{name}.glb", include_normals=True)
             for part, data in trimesh.exchange.gltf.export_gltf(
                 trimesh.Scene(ball), include_normals=True, embed_buffers=True
