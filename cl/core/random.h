@@ -14,6 +14,7 @@
 #define BLOCK_DIRECTION 3u /* scattered direction (2), roulette, lobe of the phase function */
 #define BLOCK_SHADOW 4u    /* first distance, -, stream seed (2); one block per segment walked */
 #define BLOCK_SURFACE 5u   /* opacity, direction (2), lobe of the BSDF; one block per surface met */
+#define BLOCK_GLOW 6u      /* points at which a medium's own light is gathered (4); one block per segment walked */
 
 /* Which numbers a path reads: its pixel and sample, and how far along it is. */
 typedef struct {

@@ -191,6 +191,9 @@ INLINE LanesWalked walk_lanes(const Scene *scene, uint group, __global const uin
                     paths[lane].slot = slot;
                     paths[lane].from = walk.from;
                     paths[lane].start = walk.in.world_ray.o;
+#if CLVOL_HAS_GLOW
+                    paths[lane].length = min_of(walk.in.t_max, 1e30f);
+#endif
                 }
             }
             state = kept;

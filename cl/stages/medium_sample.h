@@ -14,6 +14,9 @@
 #include "path/transitions.h"
 #include "stages/background.h"
 #include "stages/medium_collision.h"
+#if CLVOL_HAS_GLOW
+#include "stages/glow.h"
+#endif
 
 /* The one medium of the scene, from the ray's start.  Returns the steps that it took. */
 INLINE uint medium_sample(const Scene *scene, uint group, uint slot)
@@ -34,6 +37,9 @@ INLINE uint medium_sample(const Scene *scene, uint group, uint slot)
     expect_background(scene, slot, collision.through, !collided);
 #elif CLVOL_WEIGHTED
     subtract_background(scene, slot, in.medium, in.channel, collision.beta);
+#endif
+#if CLVOL_HAS_GLOW
+    gather_glow(scene, slot, &in, k, walked.leg, collided ? collision.t : (stopped ? tally.stop_t : in.t_max), &tally);
 #endif
     record_walk(scene, slot, tally, collision.beta, collision.emission);
     uint event = path_event(scene, slot);

@@ -11,6 +11,9 @@
 #include "stages/media.h"
 #include "stages/medium_collision.h"
 #include "tracking/lanes.h"
+#if CLVOL_HAS_GLOW
+#include "stages/glow.h"
+#endif
 
 #define LANE_BLOCK BLOCK_WALK
 
@@ -50,6 +53,9 @@ INLINE void lane_end(const Scene *scene, uint group, const LanePath *path, const
     Tally tally = arrival->tally;
     const Walked walked = take_walked(scene, slot, path->from);
     const bool stopped = goes_on(walked, &tally);
+#if CLVOL_HAS_GLOW
+    gather_glow(scene, path, walked.leg, arrival->happened || stopped ? arrival->t : path->length);
+#endif
     record_tally(scene, slot, tally);
 #if CLVOL_EXPECTS_BACKGROUND
     expect_background(scene, slot, arrival->estimate, !arrival->happened);

@@ -14,20 +14,10 @@
 #include "path/transitions.h"
 #include "stages/media.h"
 #include "stages/medium_collision.h"
-
-/* The factor by which a walk changed the path's weight; what had no weight keeps none. */
-INLINE Spectrum weight_ratio(Spectrum after, Spectrum before)
-{
-#if CLVOL_SPECTRUM == 1
-    return before != 0.0f ? after / before : 0.0f;
-#else
-    return (Spectrum)(before.x != 0.0f ? after.x / before.x : 0.0f, before.y != 0.0f ? after.y / before.y : 0.0f,
-                      before.z != 0.0f ? after.z / before.z : 0.0f);
+#include "stages/joint_weights.h"
+#if CLVOL_HAS_GLOW
+#include "stages/glow.h"
 #endif
-}
-
-/* Weights multiply, each walk's taken from what the path weighed before all of them. */
-#define JOINT_WEIGHTS (CLVOL_WEIGHTED && CLVOL_HAS_OVERLAP)
 
 /* Returns the steps that the walks took. */
 INLINE uint medium_sample(const Scene *scene, uint group, uint slot)
@@ -86,6 +76,9 @@ INLINE uint medium_sample(const Scene *scene, uint group, uint slot)
     MediumSegment first = {-1, 0.0f, {0.0f, 0.0f, 0.0f}};
     if (next_medium_segment(scene, ray, &inside, from, to, INFINITY, &first))
         subtract_background(scene, slot, scene->media + first.medium, (int)path_channel(scene, slot), beta);
+#endif
+#if CLVOL_HAS_GLOW
+    gather_glow_of_segments(scene, slot, ray, &inside, walked, reach, limit, before, &tally);
 #endif
     record_walk(scene, slot, tally, beta, collision.emission);
     uint event = path_event(scene, slot);

@@ -26,6 +26,9 @@ typedef struct {
     uint slot;
     float from;
     float3 start; /* in the world */
+#if CLVOL_HAS_GLOW
+    float length; /* of what was to be walked */
+#endif
 } LanePath;
 
 /* What a walk came to. */

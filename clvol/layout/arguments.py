@@ -9,11 +9,16 @@ from clvol.layout.path_state import Macros, counts_per_path
 
 @dataclass(frozen=True)
 class Argument:
-    """One kernel argument, a buffer or scalar; `needs`: a macro that must be other than 0."""
+    """One kernel argument, a buffer or scalar.
+
+    needs : a macro that must be other than 0.
+    rare : few scenes need it, and in what others compile the Scene has no room for it.
+    """
 
     name: str
     c_type: str
     needs: str = ""
+    rare: bool = False
 
 
 ARGUMENTS = (
@@ -29,6 +34,7 @@ ARGUMENTS = (
     Argument("pixel_list", "__global const uint *", "CLVOL_PIXEL_LIST"),  # pixel, its samples so far
     Argument("sobol", "__global const uint *", "CLVOL_RANDOMIZATIONS"),
     Argument("media", "__global const Medium *", "CLVOL_HAS_MEDIA"),
+    Argument("glows", "__global const Glow *", "CLVOL_HAS_GLOW", rare=True),  # one for each medium
     Argument("boundary_masks", "__global const uint *", "CLVOL_BOUNDARY_WORDS"),
     Argument("volumes", "__global const Volume *", "CLVOL_HAS_VOLUMES"),
     Argument("tops", "__global const int *", "CLVOL_HAS_VOLUMES"),

@@ -64,6 +64,11 @@ MEDIUM = _record(
     ("transfer", "i", 1),  # first of its three entries in `transfers`; -1: no value is classified
 )
 
+GLOW = _record(
+    ("emission_density", "f", 3),  # multiplies the volume, where there is one
+    ("volume", "i", 1),
+)
+
 TRANSFER = _record(
     ("first", "u", 1),  # first entry in `transfer_points`
     ("count", "u", 1),  # of its points, at least 2; 0: what it is for is not made of values
@@ -193,6 +198,7 @@ RENDER = _record(
 RECORDS = {
     "Volume": VOLUME,
     "Medium": MEDIUM,
+    "Glow": GLOW,
     "Transfer": TRANSFER,
     "Phase": PHASE,
     "Emitter": EMITTER,
@@ -204,6 +210,9 @@ RECORDS = {
     "Envmap": ENVMAP,
     "Render": RENDER,
 }
+
+RARE_RECORDS = {"Glow": "CLVOL_HAS_GLOW"}
+"""Records that few scenes have, and the macro that says so: what others compile does not hold them."""
 
 ENUMS = {
     "SHAPE": ("NONE", "CUBE", "SPHERE"),

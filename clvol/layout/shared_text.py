@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from clvol.layout import constants
 from clvol.layout.arguments import ARGUMENTS
 from clvol.layout.bsdfs import BSDF_FACTS
-from clvol.layout.records import ENUMS, RECORDS
+from clvol.layout.records import ENUMS, RARE_RECORDS, RECORDS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -51,16 +51,26 @@ def record_text(name: str, dtype: np.dtype[Any]) -> str:
 
 @cache
 def shared_text() -> str:
-    """Every record, enum and number, and the Scene, which has room for all buffers: cl/core/shared.h."""
-    parts = [record_text(name, dtype) for name, dtype in RECORDS.items()]
+    """Every record, enum and number, and the Scene, which has room for all buffers: cl/core/shared.h.
+
+    What is rare is there only where a scene has it.
+    """
+    parts = [_where(RARE_RECORDS.get(name), record_text(name, dtype)) for name, dtype in RECORDS.items()]
     for family, names in ENUMS.items():
         parts += [f"#define {family}_{name.upper()} {value}" for value, name in enumerate(names)]
     for name in _NUMBERS:
         value = getattr(constants, name)
         parts.append(f"#define {name} {value}" if value < 1 << 16 else f"#define {name} 0x{value:08X}u")
-    members = "\n".join(f"    {argument.c_type} {argument.name};" for argument in ARGUMENTS)
+    members = "\n".join(
+        _where(argument.needs if argument.rare else None, f"    {argument.c_type} {argument.name};")
+        for argument in ARGUMENTS
+    )
     parts.append(f"typedef struct {{\n{members}\n}} Scene;")
     return "\n".join(parts) + "\n"
+
+
+def _where(macro: str | None, text: str) -> str:
+    return text if macro is None else f"#if {macro}\n{text}\n#endif"
 
 
 @cache

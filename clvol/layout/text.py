@@ -49,7 +49,7 @@ def layout_text(macros: Macros, stage: Stage | None = None, unit: str | None = N
         text = "\n".join([unit, *parts])
         members = {ALWAYS}.union(*(member.findall(text) for member in _MEMBERS))
         args = [argument for argument in args if argument.name in members]
-    return "\n".join([*_scene_text(args), *parts]) + "\n"
+    return "\n".join([*_scene_text(args, macros), *parts]) + "\n"
 
 
 def _used(parts: list[str], unit: str) -> list[str]:
@@ -70,9 +70,10 @@ def _used(parts: list[str], unit: str) -> list[str]:
     return [part for part in parts if part in kept]
 
 
-def _scene_text(args: list[Argument]) -> list[str]:
+def _scene_text(args: list[Argument], macros: Macros) -> list[str]:
     """The kernels' arguments, and what a Scene is of them; what is no argument is null there."""
+    members = [a for a in ARGUMENTS if not a.rare or macros[a.needs]]
     return [
         "#define CLVOL_ARGUMENTS " + ", ".join(f"{a.c_type} {a.name}_" for a in args),
-        "#define CLVOL_SCENE {" + ", ".join(f"{a.name}_" if a in args else "0" for a in ARGUMENTS) + "}",
+        "#define CLVOL_SCENE {" + ", ".join(f"{a.name}_" if a in args else "0" for a in members) + "}",
     ]

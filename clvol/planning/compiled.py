@@ -48,6 +48,8 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_EXPECTS_BACKGROUND": int(plan.expects_background),
         "CLVOL_FLIGHT_STRATA": plan.flight_strata,
         "CLVOL_HAS_EMISSION_VOLUME": int(f.emission_volumes),
+        "CLVOL_HAS_GLOW": int(f.glow),
+        "CLVOL_HAS_GLOW_VOLUME": int(f.glow_volumes),
         "CLVOL_HAS_TEMPERATURE": int(f.temperature),
         "CLVOL_HAS_TRANSFER": int(f.transfers),
         **{f"CLVOL_PHASE_{name}": int(name in f.phases) for name in layout.ENUMS["PHASE"]},

@@ -34,6 +34,8 @@ class Features:
     albedo_volumes: bool = False
     emission: bool = False
     emission_volumes: bool = False
+    glow: bool = False
+    glow_volumes: bool = False
     temperature: bool = False
     transfers: bool = False
     interpolated_transfers: bool = False

@@ -25,6 +25,7 @@ from clvol.scene.medium_facts import (
     channels_of,
     classifies,
     is_dark_emitter,
+    is_grey,
     is_grey_of,
     is_homogeneous,
     medium_volumes,
@@ -92,6 +93,7 @@ def _medium_features(media: list[records.Medium]) -> dict[str, Any]:
     """What media are made of, and do to light."""
     varied = [m for m in media if not is_homogeneous(m)]
     emissive = [m for m in media if m.emits]
+    glowing = [m for m in media if m.glows]
     lobes = [phase_lobes(m.phase) for m in media]
     phases = {lobe.kind for mixture in lobes for lobe, _ in mixture}
     return {
@@ -108,10 +110,13 @@ def _medium_features(media: list[records.Medium]) -> dict[str, Any]:
             or (m.emission is not None and not is_grey_of(m, "emission"))
             or len(set(m.emission_scale)) > 1
             for m in emissive
-        ),
+        )
+        or not all(is_grey(m.emission_density) and len(set(m.emission_density_scale)) == 1 for m in glowing),
         "albedo_volumes": any(isinstance(m.albedo, records.GridVolume) for m in media),
         "emission": bool(emissive),
         "emission_volumes": any(isinstance(m.emission, records.GridVolume) for m in emissive),
+        "glow": bool(glowing),
+        "glow_volumes": any(isinstance(m.emission_density, records.GridVolume) for m in glowing),
         "temperature": any(isinstance(m.temperature, records.GridVolume) for m in emissive),
         "transfers": any(m.transfers is not None for m in media),
         "interpolated_transfers": any(map(classifies, media)),

@@ -59,7 +59,8 @@ def make_result(session: Session, first: int, count: int, final: bool = True) ->
 def _warn_of_unseen(session: Session, result: Result) -> None:
     """Say where the samples do not show the noise that there may be."""
     features = session.plan.features
-    if result.stats["largest_sample"] == 0 and (features.emitters or features.emission):
+    shines = features.emitters or features.emission or features.glow
+    if result.stats["largest_sample"] == 0 and shines:
         log.warning("no sample met any light: the picture may be black by chance, its noise is unknown")
     elif result.met_nothing and not result.variance.any():
         log.warning(

@@ -23,7 +23,7 @@ from clvol.tables.blackbody import blackbody_table
 from clvol.tables.light_cache import light_cache_record, rows
 from clvol.tables.lights import LightTable, envmap_arrays, light_table
 from clvol.tables.materials import material_table
-from clvol.tables.media import medium_table
+from clvol.tables.media import glow_table, medium_table
 from clvol.tables.phases import phase_table
 from clvol.tables.pixel_filter import filter_cdf
 from clvol.tables.sobol import block_table
@@ -77,6 +77,8 @@ def _medium_arrays(prepared: PreparedScene, needed: set[str]) -> dict[str, np.nd
     majorants = [table for table in tables if table is not None]
     if "media" in needed:
         arrays["media"] = medium_table(prepared)
+    if "glows" in needed:
+        arrays["glows"] = glow_table(prepared)
     if "boundary_masks" in needed:
         arrays["boundary_masks"] = prepared.boundaries.masks()
     if "majorants" in needed:

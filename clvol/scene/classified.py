@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clvol.scene.medium import common_parameters, emission_scale, own_volume, sane
+from clvol.scene.medium import common_parameters, emission_density, emission_scale, own_volume, sane
 from clvol.scene.medium_facts import channels_of
 from clvol.scene.nodes import Node
 from clvol.scene.reader import BRIGHTEST
@@ -26,6 +26,7 @@ def classified(reader: Reader) -> Medium:
 
     `opacity`, `albedo` and `emission` are points, value: number or colour, between which they are linear; the
     values are interpolated first.  `albedo` and `emission` may be a number or a colour as well.
+    `emission_density` is as in other media.
     """
     values = sane(reader, own_volume(reader, "values", "a volume of one channel"), signed=True)
     if channels_of(values) > 1:
@@ -54,6 +55,7 @@ def classified(reader: Reader) -> Medium:
         emission=volumes.get("emission"),
         transfers=Transfers(**made) if made else None,
         **emission,
+        **emission_density(reader),
         **common_parameters(reader),
     )
 

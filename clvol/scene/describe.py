@@ -244,7 +244,7 @@ def _medium(medium: records.Medium) -> str:
     return (
         f"{'homogeneous' if medium.homogeneous else 'heterogeneous'} medium: "
         f"sigma_t {_made(medium, 'sigma_t')} times {_spectrum(medium.scale)}, "
-        f"albedo {_made(medium, 'albedo')}, phase {_phase(medium.phase)}{_emission(medium)}"
+        f"albedo {_made(medium, 'albedo')}, phase {_phase(medium.phase)}{_emission(medium)}{_glow(medium)}"
     )
 
 
@@ -266,6 +266,13 @@ def _emission(medium: records.Medium) -> str:
     if not factors:
         return ""
     return f", emits {' times '.join(factors)} times {_spectrum(medium.emission_scale)}"
+
+
+def _glow(medium: records.Medium) -> str:
+    if medium.emission_density is None:
+        return ""
+    scale = _spectrum(medium.emission_density_scale)
+    return f", emits {_volume(medium.emission_density)} times {scale} per length whatever its extinction"
 
 
 def _made(medium: records.Medium, role: str) -> str:

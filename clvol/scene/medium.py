@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -37,7 +37,7 @@ def _medium(reader: Reader, homogeneous: bool) -> Medium:
     else:
         sigma_t, scale = _extinction(reader, homogeneous)
         albedo = _coefficient(reader, "albedo", 0.75, maximum=1.0)
-    emission = _emission(reader)
+    emission = _emission(reader) | emission_density(reader)
     return Medium(sigma_t, albedo, scale, homogeneous=homogeneous, **emission, **common_parameters(reader))
 
 
@@ -164,20 +164,34 @@ def _emission(reader: Reader) -> dict[str, Any]:
     needs |= dict.fromkeys(("temperature_scale", "temperature_offset"), "a temperature")
     for name, what in needs.items():
         if reader.has(name) and name not in fields:
-            reader.fail(
-                f"'{name}' of medium '{reader.type}' has nothing to scale", name, f"give the medium {what}"
-            )
+            _nothing_to_scale(reader, name, what)
     return fields
 
 
-def emission_scale(reader: Reader, largest: float) -> dict[str, Any]:
-    """`emission_scale` as a field of a Medium, whose unscaled emission is at most `largest`."""
-    factor = reader.color("emission_scale", 1.0)
+def emission_density(reader: Reader) -> dict[str, Any]:
+    """The fields of a Medium that say what it emits per length, whatever its extinction."""
+    name, scale = "emission_density", "emission_density_scale"
+    if reader.has(name):
+        volume = _coefficient(reader, name, 0.0, light=True)
+        return {name: volume} | emission_scale(reader, largest_value(volume), name)
+    if reader.has(scale):
+        _nothing_to_scale(reader, scale, "an emission_density")
+    return {}
+
+
+def emission_scale(reader: Reader, largest: float, of: str = "emission") -> dict[str, Any]:
+    """`emission_scale`, or that `of` another field, of one whose unscaled values are at most `largest`."""
+    scale = f"{of}_scale"
+    factor = reader.color(scale, 1.0)
     brightest = largest * max(factor)
     if brightest > BRIGHTEST:
-        name = "emission_scale" if reader.has("emission_scale") else "emission"
+        name = scale if reader.has(scale) else of
         reader.fail(f"medium '{reader.type}' emits {brightest:g}, and may emit at most {BRIGHTEST:g}", name)
-    return {"emission_scale": factor}
+    return {scale: factor}
+
+
+def _nothing_to_scale(reader: Reader, name: str, needed: str) -> NoReturn:
+    reader.fail(f"'{name}' of medium '{reader.type}' has nothing to scale", name, f"give the medium {needed}")
 
 
 def _temperature(reader: Reader) -> Volume:

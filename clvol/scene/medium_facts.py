@@ -14,19 +14,25 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
 _T = TypeVar("_T")
-LOOKED_UP = ("sigma_t", "albedo", "emission", "temperature")
-"""What of a medium may be a grid volume; the last two count only where it emits."""
+LOOKED_UP = {
+    "sigma_t": "",
+    "albedo": "",
+    "emission": "emits",
+    "temperature": "emits",
+    "emission_density": "glows",
+}
+"""What of a medium may be a grid volume, and the property of the medium without which it does not count."""
 
 
 def volume_roles(medium: records.Medium) -> dict[str, records.GridVolume]:
     """Grid volumes of a medium, by what of it they are."""
-    names = LOOKED_UP if medium.emits else LOOKED_UP[:2]
+    names = [name for name, of in LOOKED_UP.items() if not of or getattr(medium, of)]
     found = {name: getattr(medium, name) for name in names}
     return {name: volume for name, volume in found.items() if isinstance(volume, records.GridVolume)}
 
 
 def medium_volumes(medium: records.Medium) -> list[records.GridVolume]:
-    """Grid volumes of a medium: sigma_t, albedo and, where it emits, emission and temperature."""
+    """Grid volumes of a medium: sigma_t, albedo and, where it emits or glows, what says how much."""
     return list(volume_roles(medium).values())
 
 

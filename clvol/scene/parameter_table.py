@@ -147,11 +147,18 @@ def _medium(medium: records.Medium, seen: set[int]) -> Found:
     seen.add(id(medium))
     yield "scale", _colour(medium, "scale", np.inf)
     yield from _transfers(medium)
-    for name, maximum in (("sigma_t", np.inf), ("albedo", 1.0), ("emission", np.inf)):
+    for name, maximum in (
+        ("sigma_t", np.inf),
+        ("albedo", 1.0),
+        ("emission", np.inf),
+        ("emission_density", np.inf),
+    ):
         if getattr(medium, name) is not None and medium.transfer(name) is None:
             yield from _nested(name, _volume(getattr(medium, name), maximum, signed=False))
     if medium.emission is not None or medium.temperature is not None:
         yield "emission_scale", _colour(medium, "emission_scale", values.BRIGHTEST)
+    if medium.emission_density is not None:
+        yield "emission_density_scale", _colour(medium, "emission_density_scale", values.BRIGHTEST)
     if medium.temperature is not None:
         yield from _nested("temperature", _volume(medium.temperature, np.inf, signed=True))
         for name in ("temperature_scale", "temperature_offset"):

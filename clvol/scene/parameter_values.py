@@ -295,8 +295,9 @@ def _fault(record: Any) -> str:
             coloured = isinstance(sigma_t, records.GridVolume) and channels_of(sigma_t) > 1
             if coloured and len(factors) > 1:
                 return "a coloured scale needs a sigma_t of one channel, this grid has three"
-            emission = record.emission or records.ConstVolume((0.0,))
-            brightest = largest_value(emission) * max(record.emission_scale)
-            if brightest > BRIGHTEST:
-                return f"the medium emits {brightest:g}, and may emit at most {BRIGHTEST:g}"
+            emitted = (record.emission, record.emission_scale)
+            for emission, scale in (emitted, (record.emission_density, record.emission_density_scale)):
+                brightest = largest_value(emission or records.ConstVolume((0.0,))) * max(scale)
+                if brightest > BRIGHTEST:
+                    return f"the medium emits {brightest:g}, and may emit at most {BRIGHTEST:g}"
     return ""

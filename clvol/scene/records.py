@@ -185,13 +185,14 @@ class Medium:
     """Participating medium: sigma_t(x) = scale · sigma_t volume, sigma_s = albedo · sigma_t.
 
     A `homogeneous` medium fills its shape; a heterogeneous one is clipped to the box of its
-    sigma_t volume as well.  `scale` and `emission_scale` may be given as one number.
+    sigma_t volume as well.  `scale` and the scales of emission may be given as one number.
 
     It emits sigma_a · L_e per length, where L_e = emission_scale · emission · blackbody(kelvin), without the
     factor that is None (both: no emission at all), and kelvin = (temperature − temperature_offset) ·
     temperature_scale.  `transfers` say what is made of the volumes' values, after interpolation, before all
     that.  The blackbody is `clvol.tables.blackbody.blackbody_rgb`: of luminance 1, and 0 where
-    kelvin <= 0.
+    kelvin <= 0.  Beside that it emits emission_density_scale · emission_density per length, W/(m³ sr),
+    whatever its extinction.
     """
 
     sigma_t: Volume
@@ -205,11 +206,13 @@ class Medium:
     emission_scale: Spectrum = (1.0,)
     temperature_scale: float = 1.0
     temperature_offset: float = 0.0
+    emission_density: Volume | None = None
+    emission_density_scale: Spectrum = (1.0,)
     transfers: Transfers | None = None
     name: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("scale", "emission_scale"):
+        for name in ("scale", "emission_scale", "emission_density_scale"):
             object.__setattr__(self, name, as_spectrum(getattr(self, name)))
 
     @property
@@ -222,6 +225,13 @@ class Medium:
         if isinstance(self.temperature, ConstVolume):
             return (self.temperature.value[0] - self.temperature_offset) * self.temperature_scale > 0
         return True
+
+    @property
+    def glows(self) -> bool:
+        """Whether its emission_density is anything but 0 everywhere, as far as can be told."""
+        density = self.emission_density
+        dark = density is None or (isinstance(density, ConstVolume) and not any(density.value))
+        return not dark and any(self.emission_density_scale)
 
     def transfer(self, role: str) -> Transfer | None:
         """What is made of the values of the volume that is "sigma_t", "albedo" or "emission", if anything."""

@@ -9,6 +9,7 @@ import numpy as np
 from clvol.errors import SceneError
 from clvol.scene import records
 from clvol.scene.boundaries import Boundaries, MediumEntry, is_clipped, scene_sphere, shape_bounds
+from clvol.scene.medium_facts import medium_volumes
 from clvol.scene.primitives import mesh_of
 
 log = logging.getLogger("clvol")
@@ -91,8 +92,7 @@ def check_thinness(scene: records.Scene, found: Boundaries) -> None:
 
 
 def _needs_places(medium: records.Medium) -> bool:
-    fields = (medium.sigma_t, medium.albedo, *((medium.emission, medium.temperature) if medium.emits else ()))
-    if any(isinstance(field, records.GridVolume) for field in fields):
+    if medium_volumes(medium):
         return True
     return isinstance(medium.albedo, records.ConstVolume) and max(medium.albedo.value) > 0
 

@@ -26,12 +26,15 @@ _CHUNK = 1 << 16
 def check_camera_medium(scene: records.Scene, found: Boundaries) -> None:
     """Raise SceneError where what the sensor says about its medium cannot be so.
 
-    Warns of light that a medium without an end swallows.
+    So it does for a medium without an end whose light is more than it absorbs.  Warns of light from afar that
+    such a medium swallows.
     """
     named = scene.sensor.medium
     for entry in found.entries:
         if entry.everywhere and _endless(entry.medium):
             _check_far_light(scene, entry.medium)
+        if entry.everywhere and not is_clipped(entry.medium):
+            _check_glow(scene, entry.medium)
     if named is not None and not _surrounds(scene, found, named):
         raise SceneError(
             f"the sensor names medium{_quoted(named)}, and is not inside of the shapes that hold it",
@@ -77,6 +80,25 @@ def _check_far_light(scene: records.Scene, medium: records.Medium) -> None:
     if medium is scene.sensor.medium:
         raise SceneError(f"{what}: the sensor is in it, and no shape holds it", scene.source, hint)
     log.warning("%s: it is only ever the exterior of shapes; %s", what, hint)
+
+
+def _check_glow(scene: records.Scene, medium: records.Medium) -> None:
+    """Where a medium without an end absorbs nothing, its glow adds up to infinity."""
+    if not medium.glows:
+        return
+    glow, absorbed = np.broadcast_to(np.array(medium.emission_density_scale), 3), np.array(medium.scale)
+    if isinstance(medium.emission_density, records.ConstVolume):
+        glow = glow * medium.emission_density.value
+    if isinstance(medium.sigma_t, records.ConstVolume):
+        absorbed = absorbed * medium.sigma_t.value
+    if isinstance(medium.albedo, records.ConstVolume):
+        absorbed = absorbed * (1 - np.array(medium.albedo.value))
+    if not _endless(medium) or ((glow > 0) & (np.broadcast_to(absorbed, 3) == 0)).any():
+        raise SceneError(
+            f"medium{_quoted(medium)} has no end and emits what it does not absorb: it is infinitely bright",
+            scene.source,
+            "bound it by a shape round everything: its interior, with a null BSDF",
+        )
 
 
 def _surrounds(scene: records.Scene, found: Boundaries, medium: records.Medium) -> bool:

@@ -83,6 +83,20 @@ def medium_table(prepared: PreparedScene) -> np.ndarray:
     return table
 
 
+def glow_table(prepared: PreparedScene) -> np.ndarray:
+    """GLOW records, one for each MEDIUM."""
+    entries, matter = prepared.boundaries.entries, prepared.matter
+    table = np.zeros(len(entries), layout.GLOW)
+    for record, entry, number in zip(table, entries, matter.of_entry, strict=True):
+        medium = entry.medium
+        record["volume"] = matter.roles[number].get("emission_density", -1)
+        if medium.glows:
+            density = medium.emission_density
+            constant = rgb(density.value) if isinstance(density, records.ConstVolume) else 1.0
+            record["emission_density"] = rgb(medium.emission_density_scale) * constant
+    return table
+
+
 def _clip_to(record: np.void, box: tuple[np.ndarray, np.ndarray], centre: np.ndarray) -> None:
     """Bounds a medium by a world box as well: a boundary that is open lets no path stray for ever."""
     slack = BOUND_SLACK * (np.linalg.norm(box[1] - box[0]) + np.abs(box[0] - centre).max())

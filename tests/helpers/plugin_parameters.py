@@ -121,6 +121,8 @@ MEDIUM = {
     "temperature": VOLUME,
     "temperature_scale": 2.0,
     "temperature_offset": -1.0,
+    "emission_density": VOLUME,
+    "emission_density_scale": RGB,
 }
 SAMPLER = {"sample_count": 9, "seed": 9}
 TECHNICAL = {name: LIMITS[name] for name in ("samples_per_pass", "block_size", "timeout")}
@@ -276,10 +278,13 @@ PARAMETERS = {
         {"weight": 0.5, "a": {"type": "diffuse"}, "b": {"type": "plastic"}},
         {"weight": TEXTURE, "a": {"type": "conductor"}, "b": {"type": "null"}},
     ),
-    "homogeneous": ({"emission": 1.0, "temperature": 900.0}, MEDIUM),
-    "heterogeneous": ({"emission": 1.0, "temperature": 900.0}, MEDIUM | {"sigma_t": VOLUME}),
+    "homogeneous": ({"emission": 1.0, "temperature": 900.0, "emission_density": 1.0}, MEDIUM),
+    "heterogeneous": (
+        {"emission": 1.0, "temperature": 900.0, "emission_density": 1.0},
+        MEDIUM | {"sigma_t": VOLUME},
+    ),
     "classified": (
-        {"values": VOLUME, "opacity": "0: 0, 1: 2", "emission": 1.0},
+        {"values": VOLUME, "opacity": "0: 0, 1: 2", "emission": 1.0, "emission_density": 1.0},
         {
             "values": {"type": "gridvolume", "filename": "b.vol"},
             "opacity": "0: 0, 0.5: 3",
@@ -287,6 +292,8 @@ PARAMETERS = {
             "scale": 2.0,
             "emission": "0: 0, 1: 3",
             "emission_scale": 2.0,
+            "emission_density": VOLUME,
+            "emission_density_scale": 2.0,
             "sample_emitters": False,
             "has_spectral_extinction": Silent(True),
             "phase": {"type": "rayleigh"},

@@ -1,10 +1,13 @@
 """The device sees the records that the host writes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pyopencl as cl
 from probe import Probe, medium_of, scene_of
 
 from clvol import layout
+from clvol.scene.records import ConstVolume
 
 
 def test_records_have_the_same_sizes_and_offsets_on_the_device(device):
@@ -20,7 +23,8 @@ def test_records_have_the_same_sizes_and_offsets_on_the_device(device):
         lines.append("}")
     body = "if (i > 0) return;\n__global uint *p = out0;\n" + "\n".join(lines)
     out = np.zeros(len(expected), np.uint32)
-    Probe(device, scene_of(medium_of(1.0))).run([], body, [out])
+    everything = replace(medium_of(1.0), emission_density=ConstVolume((1.0,)))  # with the rare records
+    Probe(device, scene_of(everything)).run([], body, [out])
     assert out.tolist() == expected
 
 

@@ -374,6 +374,8 @@ def test_the_digest_depends_on_every_field_of_a_medium():
         "emission_scale": 2.0,
         "temperature_scale": 2.0,
         "temperature_offset": 2.0,
+        "emission_density": ConstVolume((1.0,)),
+        "emission_density_scale": 2.0,
         "transfers": Transfers(sigma_t=Transfer(np.arange(2, dtype=np.float32), np.ones((2, 3), np.float32))),
     }
     assert {f.name for f in fields(Medium)} == {"name", *other}
