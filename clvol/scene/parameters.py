@@ -11,7 +11,7 @@ import numpy as np
 from clvol.errors import OptionError, shown
 from clvol.scene.parameter_table import Parameter, parameters_of, sensor_parameters
 from clvol.scene.parameter_values import check_together
-from clvol.scene.records import Scene, Sensor
+from clvol.scene.records import Medium, Scene, Sensor
 from clvol.scene.vocabulary import did_you_mean, join_hints, listed
 
 _ALIASES = {"interior": "interior_medium", "exterior": "exterior_medium", "phase": "phase_function"}
@@ -158,10 +158,13 @@ class SceneParameters(MutableMapping[str, Any]):
         made: dict[int, tuple[object, Any]] = {}
         for name, value in changed.items():
             _put(made, self._found[name], value)
-        for name in changed:
-            check_together(made[id(self._found[name].owner)][1], name)
         done: dict[int, Any] = {}
         parts = {field: _rebuilt(getattr(self.scene, field), made, done) for field in _SCENE_FIELDS}
+        media = [record for record in done.values() if isinstance(record, Medium)]
+        for name in changed:
+            record = done[id(self._found[name].owner)]
+            for one in (record, *(medium for medium in media if _holds(medium, record))):
+                check_together(one, name)
         self._put(parts)
         self._set.clear()
         self._read()
@@ -218,6 +221,11 @@ def _rebuilt(value: Any, made: Mapping[int, tuple[object, Any]], done: dict[int,
                     changes[field.name] = other
         done[id(value)] = replace(record, **changes) if changes else record
     return done[id(value)]
+
+
+def _holds(medium: Medium, volume: Any) -> bool:
+    """Whether a volume is one of a medium's, whose other values it has to go with."""
+    return any(getattr(medium, field.name) is volume for field in fields(medium))
 
 
 def _same(one: Any, other: Any) -> bool:
