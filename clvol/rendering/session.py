@@ -21,10 +21,11 @@ from clvol.planning.in_force import warnings
 from clvol.planning.plan import Plan
 from clvol.planning.settled import Tuning
 from clvol.rendering.light_cache import light_cache_unit
+from clvol.rendering.pool import Pool
 from clvol.rendering.profiler import Profiler, timed
 from clvol.rendering.residence import Residence, compiled
 from clvol.rendering.upload import upload_scene
-from clvol.rendering.wavefront import Pool, Wavefront
+from clvol.rendering.wavefront import Wavefront
 from clvol.scene.digest import scene_digest
 from clvol.tables.camera import camera_rays, reach_of
 from clvol.tables.colours import rgb

@@ -11,16 +11,13 @@ from __future__ import annotations
 import logging
 import time
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyopencl as cl
 
 from clvol import layout
-from clvol.base.arguments import whole
 from clvol.device.launch import launch, scene_arguments, set_arguments
-from clvol.errors import OptionError
 from clvol.rendering.film import Film
 from clvol.rendering.handled import Handled
 from clvol.rendering.profiler import timed
@@ -30,6 +27,7 @@ if TYPE_CHECKING:
 
     from clvol.device.device import Device
     from clvol.planning.plan import Plan
+    from clvol.rendering.pool import Pool
     from clvol.rendering.profiler import Profiler
 
 log = logging.getLogger("clvol")
@@ -46,30 +44,6 @@ _PATIENCE_SECONDS = 10.0
 never end.  Whole passes that then lack a path are dropped."""
 _FIRST_PATIENCE_SECONDS = 30.0
 """The same where no pass is finished yet: without one there is no picture."""
-
-
-@dataclass(frozen=True)
-class Pool:
-    """How many paths are in flight, how many jobs a pass holds (at least one sample per pixel), and the ring.
-
-    On a processor more slots take as long or longer, and fewer take more waves, each with its launches.
-    """
-
-    slots: int
-    pass_jobs: int
-    ring_jobs: int
-
-    @classmethod
-    def for_device(cls, device: Device, plan: Plan, slots: int | None = None) -> Pool:
-        """Pool for a device; `slots` is rounded up to whole groups."""
-        if slots is None:
-            slots = 1 << 15 if device.is_cpu else 1 << 20
-        slots = whole("pool", slots)
-        if not 1 <= slots <= 1 << 26:
-            raise OptionError(f"a pool of {slots} paths", hint="give 1 to 67108864")
-        groups = max(1, -(-slots // plan.tuning.group_slots))
-        slots = groups * plan.tuning.group_slots
-        return cls(slots, pass_jobs=4 * slots, ring_jobs=32 * slots)
 
 
 class Wavefront:
