@@ -111,7 +111,11 @@ def _medium_features(media: list[records.Medium]) -> dict[str, Any]:
             or len(set(m.emission_scale)) > 1
             for m in emissive
         )
-        or not all(is_grey(m.emission_density) and len(set(m.emission_density_scale)) == 1 for m in glowing),
+        or any(
+            (m.emission_density is not None and not is_grey(m.emission_density))
+            or len(set(m.emission_density_scale)) > 1
+            for m in glowing
+        ),
         "albedo_volumes": any(isinstance(m.albedo, records.GridVolume) for m in media),
         "emission": bool(emissive),
         "emission_volumes": any(isinstance(m.emission, records.GridVolume) for m in emissive),
