@@ -40,7 +40,7 @@ class Library:
     def __init__(
         self, root: Node, plugins: PluginTable, grids: Grids | None = None, faults: Faults | None = None
     ) -> None:
-        self.plugins = plugins
+        self.root, self.plugins = root, plugins
         self.faults = Faults() if faults is None else faults
         self.grids: Grids = {} if grids is None else grids
         self.reduced: dict[int, Any] = {}  # by id() of a grid or volume that `grids` or a record keeps alive
@@ -119,6 +119,13 @@ class Library:
             hint = join_hints(did_you_mean(node.type, known), f"supported: {listed(known)}")
             raise UnsupportedError(f"unknown plugin '{node.type}'", node.where, hint)
         return node.kind or by_type
+
+    def sensors(self) -> list[Node]:
+        """The scene's sensors, as they are given."""
+        nodes = [
+            value for _, value in self.root.parameters() if isinstance(value, Node) and not value.is_value
+        ]
+        return [node for node in nodes if node.type != "ref" and self.kind_of(node) == "sensor"]
 
     def check_supported(self, node: Node) -> None:
         """Raise for a plugin that is unknown, or known but not supported in this version."""

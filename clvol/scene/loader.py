@@ -23,6 +23,7 @@ from clvol.scene import (
     sunsky,
     tabulated,
     texture,
+    timed_sunsky,
     volume,
 )
 from clvol.scene.building import build, build_whole
@@ -125,6 +126,7 @@ PLUGINS: PluginTable = {
         "spot": emitter.spot,
         "area": emitter.area,
         "sunsky": sunsky.sunsky,
+        "timed_sunsky": timed_sunsky.timed_sunsky,
     },
     "texture": {
         **SPECTRA,

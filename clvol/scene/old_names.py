@@ -32,9 +32,16 @@ ON_ALL: dict[str, tuple[str, ...]] = {
 """By kind of plugin: parameters that change no expected picture, or only how it is shown."""
 
 
+SKIES = ("sky", "sun", "sunsky")
+"""Emitters that are a `sunsky` now."""
+
 NOT_HEEDED: dict[tuple[str, str, str], str] = {
     ("shape", "", "max_smooth_angle"): "vertex normals are those of the file",
     ("rfilter", "box", "radius"): "the filter is a pixel wide",
+    **dict.fromkeys(
+        ((("emitter", name, parameter)) for name in SKIES for parameter in ("stretch", "extend")),
+        "no light comes from below the horizon",
+    ),
 }
 """By kind, type ("": any) and parameter of plugins: in what the picture is another, which is said."""
 
@@ -67,6 +74,20 @@ _FILM = Rule(
 )
 _BITMAP = Rule(values={"filter_type": {"ewa": "bilinear", "trilinear": "bilinear", "isotropic": "bilinear"}})
 _COPPER = Rule(added=(("string", "material", "Cu"),), unless=("eta", "k"))
+
+
+def _sky(scale: str = "", absent: str = "") -> Rule:
+    """What becomes of a sky or a sun; `scale`: of the one that is there.  `absent`: of the other."""
+    albedo = ("spectrum", "albedo", "0.2")
+    return Rule(
+        "sunsky",
+        renamed={"scale": scale} if scale else {},
+        dropped=("resolution",),
+        added=(albedo, ("float", absent, "0")) if absent else (albedo,),
+        said="" if absent == "sun_scale" else "sunsky, whose sun is Hosek and Wilkie's",
+    )
+
+
 _PIXELS = "hdrfilm: pictures are linear, and shown as the command line says"
 
 RULES: dict[tuple[str, str], Rule] = {
@@ -98,6 +119,9 @@ RULES: dict[tuple[str, str], Rule] = {
     ("emitter", "constant"): Rule(renamed={"intensity": "radiance"}),
     ("emitter", "area"): Rule(renamed={"intensity": "radiance"}),
     ("emitter", "directional"): Rule(renamed={"intensity": "irradiance"}),
+    ("emitter", "sky"): _sky("sky_scale", "sun_scale"),
+    ("emitter", "sun"): _sky("sun_scale", "sky_scale"),
+    ("emitter", "sunsky"): _sky(),
     ("integrator", "vrl"): Rule(
         "volpath",
         dropped=(

@@ -1,4 +1,4 @@
-"""Emitters `sunsky` and `timed_sunsky`: a sky as an environment map, and the sun as a light of its own.
+"""Emitter `sunsky`: a sky as an environment map, and the sun as a light of its own.
 
 Locally z is up.  As in Mitsuba, nothing shines from below the horizon, nor while the sun's middle is there.
 """
@@ -50,24 +50,26 @@ class Air:
 
 def sunsky(reader: Reader) -> tuple[Emitter, ...]:
     """The `sunsky` plugin: the sky and the sun at a time and place, or with the sun in a direction."""
-    air = _air(reader)
-    local = _sun(reader, air)
+    air = read_air(reader)
+    return lights(reader, air, _sun(reader, air))
+
+
+def lights(reader: Reader, air: Air, local: np.ndarray) -> tuple[Emitter, ...]:
+    """The sky and the sun, with the sun in a direction of local space."""
     irradiance = np.zeros(3)
     if local[2] < 0:
-        reader.library.faults.approximate(
-            "a sunsky whose sun is below the horizon is black", reader.place("")
-        )
+        reader.library.faults.approximate("a sky whose sun is below the horizon is black", reader.place(""))
     elif air.sun_scale > 0:
         irradiance = air.sun_scale * _visible(reader, sun_irradiance(air.turbidity, np.arcsin(local[2])))
     sky: Emitter = ConstantEmitter((0.0,))
     if air.sky_scale > 0 and local[2] >= 0:
-        sky = EnvmapEmitter(_checked(reader, _sky_map(air, local)), air.to_world @ FROM_MAP, "sunsky")
+        sky = EnvmapEmitter(checked(reader, _sky_map(air, local)), air.to_world @ FROM_MAP, reader.type)
     if not irradiance.any():
         return (sky,)
     turn = air.to_world[:3, :3] / np.cbrt(np.abs(np.linalg.det(air.to_world[:3, :3])))
     half = np.radians(air.aperture / 2)
     sun = SunEmitter(
-        tuple(_checked(reader, irradiance).tolist()),
+        tuple(checked(reader, irradiance).tolist()),
         tuple((turn @ local).tolist()),
         air.aperture,
         tuple(turn[:, 2].tolist()) if np.arcsin(local[2]) < half else None,
@@ -75,7 +77,7 @@ def sunsky(reader: Reader) -> tuple[Emitter, ...]:
     return sky, sun
 
 
-def _air(reader: Reader) -> Air:
+def read_air(reader: Reader) -> Air:
     """Everything but where the sun stands."""
     accept_common(reader)
     turbidity = reader.number("turbidity", 3.0, *TURBIDITIES)
@@ -142,14 +144,19 @@ def read_date(reader: Reader, prefix: str, year: int, month: int, day: int) -> d
 def _visible(reader: Reader, irradiance: np.ndarray) -> np.ndarray:
     """A colour without what a low sun lacks of blue."""
     if (irradiance < 0).any():
-        reader.library.faults.approximate(
-            "the blue of a low sun, which sRGB has below 0, is 0", reader.place("")
-        )
+        say_blue(reader)
     visible: np.ndarray = np.maximum(irradiance, 0.0)
     return visible
 
 
-def _checked(reader: Reader, light: np.ndarray) -> np.ndarray:
+def say_blue(reader: Reader) -> None:
+    """Say that blue is cut."""
+    what = "the blue of a low sun, which sRGB has below 0, is 0"
+    reader.library.faults.approximate(what, reader.place(""))
+
+
+def checked(reader: Reader, light: np.ndarray) -> np.ndarray:
+    """Light that is not too bright."""
     if light.max() > BRIGHTEST:
         reader.fail(f"a {reader.type} must not exceed {BRIGHTEST:g}", "", "lower sky_scale or sun_scale")
     return light

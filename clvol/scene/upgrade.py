@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.scene.old_names import NOT_HEEDED, NULL_IN_MEDIA, ON_ALL, RULES, TAGS, UV, Rule
+from clvol.scene.old_names import NOT_HEEDED, NULL_IN_MEDIA, ON_ALL, RULES, SKIES, TAGS, UV, Rule
 from clvol.scene.spectra import srgb_to_linear
 from clvol.scene.xml_tree import Element
 
@@ -81,6 +81,8 @@ def _plugin(element: Element, faults: Faults) -> Element:
     made = replace(element, attributes=element.attributes | {"type": rule.to or name}, children=children)
     if kind == "shape":
         return _shape(made)
+    if kind == "emitter" and name in SKIES:
+        return _sky(made)
     if kind == "texture":
         return _decoded(_texture(made), faults)
     return _grid(made) if name == "gridvolume" else made
@@ -173,6 +175,45 @@ def _grid(element: Element) -> Element:
     to_world = Element("transform", {"name": "to_world"}, element.where, steps, old=True)
     to_world.children += own.children if own else []
     return replace(element, children=[*others, to_world])
+
+
+SUN_APERTURE, LEAST_APERTURE = 0.5358, 1e-4
+"""Of the sun, in degrees, and of one that had no size."""
+SKY_MATRIX = "0 -1 0 0  0 0 1 0  1 0 0 0  0 0 0 1"
+"""From a sky whose z is up and whose x is south to one whose y is up and whose x is east."""
+
+
+def _sky(element: Element) -> Element:
+    """A sky: one scale for both parts, the size of the sun, and where up was."""
+    children = []
+    for child in element.children:
+        name, value = child.attributes.get("name", ""), child.attributes.get("value", "")
+        if name == "scale":
+            both = ({"name": part} for part in ("sky_scale", "sun_scale") if not _has(element, part))
+            children += [replace(child, attributes=child.attributes | named) for named in both]
+        elif name == "sun_radius_scale":
+            changed = {"name": "sun_aperture", "value": _aperture(value)}
+            children.append(replace(child, attributes=child.attributes | changed))
+        elif name != "to_world":
+            children.append(child)
+    own = next((child for child in element.children if _named(child, ("to_world",))), None)
+    steps = [
+        Element("matrix", {"value": SKY_MATRIX}, element.where, old=True),
+        *(own.children if own else []),
+    ]
+    children.append(Element("transform", {"name": "to_world"}, element.where, steps, old=True))
+    return replace(element, children=children)
+
+
+def _aperture(text: str) -> str:
+    try:
+        return repr(max(float(text) * SUN_APERTURE, LEAST_APERTURE))
+    except ValueError:
+        return text  # no number, or a $name: the reader says that it is none
+
+
+def _has(element: Element, name: str) -> bool:
+    return any(_named(child, (name,)) for child in element.children)
 
 
 def _named(element: Element, names: tuple[str, ...]) -> bool:

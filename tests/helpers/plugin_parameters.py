@@ -362,6 +362,20 @@ PARAMETERS = {
         | {"latitude": 20.0, "longitude": 20.0, "timezone": 2.0, "year": 1999, "month": 3, "day": 3}
         | {"hour": 10.0, "minute": 20.0, "second": 300.0},
     ),
+    "timed_sunsky": (
+        {"start_month": 3, "start_day": 20},
+        LIGHT
+        | {"turbidity": 4.0, "albedo": RGB, "sky_scale": 2.0, "sun_scale": 0.5, "sun_aperture": 3.0}
+        | {
+            "complex_sun": Silent(True),
+            "to_world": TURNED,
+            "shutter_open": -1.0,
+            "shutter_close": Silent(2.0),
+        }
+        | {"latitude": 20.0, "longitude": 20.0, "timezone": 8.0, "window_start_time": 10.0}
+        | {"start_year": 2027, "start_month": 6, "start_day": 3, "window_end_time": Silent(20.0)}
+        | {"end_year": Silent(2031), "end_month": Silent(5), "end_day": Silent(30)},
+    ),
     "area": ({}, LIGHT | {"radiance": RGB}),
     "bitmap": (
         {"bitmap": TEXELS},

@@ -30,6 +30,11 @@ MITSUBAS = {
         "albedo complex_sun day hour latitude longitude minute month sampling_weight second sky_scale "
         "sun_aperture sun_direction sun_scale timezone to_world turbidity year"
     ),
+    "timed_sunsky": (
+        "albedo complex_sun end_day end_month end_year latitude longitude sampling_weight shutter_close "
+        "shutter_open sky_scale start_day start_month start_year sun_aperture sun_scale timezone to_world "
+        "turbidity window_end_time window_start_time"
+    ),
     "envmap": "bitmap filename mis_compensation sampling_weight scale to_world",
     "perspective": (
         "far_clip focal_length focus_distance fov fov_axis near_clip principal_point_offset_x "

@@ -200,3 +200,45 @@ def test_what_changes_the_picture_and_is_not_heeded_is_said():
     assert found.film.pixel_format == "rgba"
     wide = sensor('<rfilter type="tent"><float name="radius" value="2"/></rfilter>')
     assert same(old(sensor=wide), new(sensor=wide))
+
+
+@pytest.mark.parametrize(
+    ("before", "now"),
+    [
+        ('type="sky"', {"albedo": 0.2, "sun_scale": 0}),
+        ('type="sky">scale=3 resolution=64 turbidity=4', {"sky_scale": 3, "sun_scale": 0, "turbidity": 4}),
+        ('type="sun">scale=3', {"sun_scale": 3, "sky_scale": 0}),
+        (
+            'type="sunsky">scale=3 skyScale=2 sunRadiusScale=2',
+            {"sun_scale": 3, "sky_scale": 2, "sun_aperture": 1.0716},
+        ),
+        ('type="sunsky">sunRadiusScale=0', {"sun_aperture": 1e-4}),
+        ('type="sunsky">hour=9 longitude=130', {"hour": 9, "longitude": 130}),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_skies_and_suns_are_a_sunsky_whose_y_is_up(before, now):
+    """Its axes are those that Mitsuba 0.6 documents for the azimuth: x is east and z south."""
+    plugin, _, parameters = before.partition(">")
+    given = "".join('<float name="{}" value="{}"/>'.format(*one.split("=")) for one in parameters.split())
+    wanted = "".join(
+        f'<float name="{name}" value="{value}"/>' for name, value in ({"albedo": 0.2} | now).items()
+    )
+    frame = '<transform name="toWorld"><rotate x="1" angle="90"/></transform>'
+    found = old(f"<emitter {plugin}>{given}{frame}</emitter>")
+    matrix = '<matrix value="0 -1 0 0  0 0 1 0  1 0 0 0  0 0 0 1"/><rotate x="1" angle="90"/>'
+    to_world = f'<transform name="to_world">{matrix}</transform>'
+    assert same(found, new(f'<emitter type="sunsky">{wanted}{to_world}</emitter>'))
+
+
+def test_an_old_sun_at_noon_is_high_in_the_south():
+    [_, sun] = old('<emitter type="sunsky"><float name="hour" value="11.7"/></emitter>').emitters
+    assert sun.sun_direction[1] > 0.9 and sun.sun_direction[2] > 0.2 and abs(sun.sun_direction[0]) < 0.05
+    [_, sun] = old('<emitter type="sunsky"><float name="hour" value="8"/></emitter>').emitters
+    assert sun.sun_direction[0] > 0.7
+
+
+def test_what_an_old_sky_below_the_horizon_had_is_said():
+    assert (
+        "horizon" in old('<emitter type="sky"><float name="stretch" value="1.2"/></emitter>').approximated[0]
+    )
