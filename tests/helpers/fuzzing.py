@@ -33,7 +33,7 @@ SECONDS = 10
 MEMORY = 256 << 20
 """Bytes of address space that a process may take beside what it has once all modules are loaded."""
 LONGEST = 3000
-"""Characters of an error's message at most: one clear line, or a list of a scene's faults."""
+"""Characters of a line of an error at most; only a list of a scene's faults has several."""
 ODD = (
     0,
     1,
@@ -173,7 +173,8 @@ def fault_of(read: Callable[[Path], object], path: Path, error_type: type[Except
         lines = message.split("\n") if getattr(error, "whole", False) else [message]
         if not all(map(str.isprintable, lines)):
             return f"a message that does not print: {message!r}", True
-        return (f"a message of {len(message)} characters" if len(message) > LONGEST else ""), True
+        longest = max(map(len, lines))
+        return (f"a message of {longest} characters" if longest > LONGEST else ""), True
     except BaseException:
         return traceback.format_exc(limit=-6), False
     finally:

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import resource
 import shutil
+import signal
 import stat
+import subprocess
+import sys
 import tempfile
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +20,7 @@ import numpy as np
 import OpenImageIO as oiio  # noqa: N813
 import pytest
 from click.testing import CliRunner
+from places import ROOT
 
 import clvol
 from clvol.base.output_files import check_file, write_file
@@ -162,6 +167,36 @@ def test_a_report_is_replaced_whole_or_not_at_all(tmp_path: Path) -> None:
     assert only(target, "a").read_bytes() == b"1"
     _replace(target, {"b": b"3"})
     assert only(target, "b").read_bytes() == b"3" and stat.S_IMODE(target.stat().st_mode) == 0o700
+
+
+KILLED = """
+import os, signal, sys
+from clvol.base import output_files
+setattr(output_files.os, sys.argv[1], lambda *_: os.kill(os.getpid(), signal.SIGKILL))
+output_files.write_file(sys.argv[2], b"later" * 9999)
+"""
+
+
+@pytest.mark.parametrize("moment", ["fsync", "replace"])
+def test_a_process_that_is_killed_while_it_saves_leaves_the_earlier_file(tmp_path: Path, moment: str) -> None:
+    (tmp_path / "a").write_bytes(b"earlier")
+    done = subprocess.run([sys.executable, "-c", KILLED, moment, str(tmp_path / "a")], check=False)
+    assert done.returncode == -signal.SIGKILL
+    assert (tmp_path / "a").read_bytes() == b"earlier"
+
+
+def test_every_file_is_written_whole() -> None:
+    """By output_files; but for notes of PoCL's cache, of which a part does no harm, and a film under way."""
+    writes = re.compile(
+        r"\bopen\([^()]*,\s*[\"'][wax]b?\+?[\"']|\.open\(\s*[\"'][wax]|(?<!formatter)\.write_(text|bytes)\(|\.tofile\("
+        r"|np\.save\w*\((?!file)|savefig\((?!stream|buffer)"
+    )
+    found = {
+        f"{path.parent.name}/{path.name}"
+        for path in (ROOT / "clvol").rglob("*.py")
+        if writes.search(path.read_text(encoding="utf-8"))
+    }
+    assert found == {"base/output_files.py", "device/kernel_cache.py", "device/side_builds.py"}
 
 
 # --- whatever fails after the last sample ----------------------------------------------------------

@@ -8,9 +8,13 @@ import time
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from every_bit import rendered, scene
+from signals import press_key
 
 import clvol
+from clvol.base.progress import RichProgress
+from clvol.cli.main import main
 from clvol.rendering import checkpoint as checkpoints
 
 SPP, SEED, CUT = 48, 5, 19
@@ -160,18 +164,56 @@ def test_a_full_disk_costs_no_picture(tmp_path, monkeypatch, caplog):
     assert "no checkpoint" in caplog.text
 
 
-@pytest.mark.contract
-def test_a_killed_process_loses_nothing_that_was_kept(tmp_path):
-    """Kill -9 at any moment, then the same command: the bits of a render that nothing ended."""
-    scene_file = tmp_path / "s.xml"
-    film = "".join(f'<integer name="{side}" value="64"/>' for side in ("width", "height"))
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_leaves_a_checkpoint_and_the_picture(tmp_path, monkeypatch, number):
+    """As Ctrl-C does, and with the status of the signal: cluster schedulers send SIGTERM before they kill."""
+    path, pressed = scene_file(tmp_path, 8), []
+
+    def press_once(_bar, record):
+        if not pressed and record.samples_done:
+            pressed.append(press_key(number))
+
+    def run(*options):
+        command = ["render", str(path), "-o", str(tmp_path / "a.exr"), "--seed", "3", *options]
+        return CliRunner().invoke(main, command).exit_code
+
+    with monkeypatch.context() as patch:
+        patch.setattr(RichProgress, "__call__", press_once)
+        assert run("--checkpoint", str(tmp_path / "a.npz"), "--time", "120") == 128 + number
+    done = clvol.load_result(tmp_path / "a.exr").samples[1]
+    assert checkpoints.read_checkpoint(tmp_path / "a.npz").done == done > 0
+    assert run("--resume", str(tmp_path / "a.npz"), "--spp", str(done + 3), "--quiet") == 0
+    more = clvol.load_result(tmp_path / "a.exr")
+    assert more.image.tobytes() == clvol.render(clvol.load_file(path), spp=done + 3, seed=3).image.tobytes()
+
+
+def scene_file(folder, size):
+    """A ball under a white sky, in a folder."""
+    path = folder / "s.xml"
+    film = "".join(f'<integer name="{side}" value="{size}"/>' for side in ("width", "height"))
     film += '<string name="component_format" value="float32"/>'
-    scene_file.write_text(
+    path.write_text(
         f'<scene version="3.0.0"><sensor type="perspective"><film type="hdrfilm">{film}</film></sensor>'
         '<emitter type="constant"/>'
         '<shape type="sphere"><point name="center" x="0" y="0" z="5"/><bsdf type="diffuse"/></shape></scene>'
     )
-    command = [sys.executable, "-m", "clvol", "render", str(scene_file), "--spp", "4000", "--quiet", "-o"]
+    return path
+
+
+@pytest.mark.contract
+def test_a_killed_process_loses_nothing_that_was_kept(tmp_path):
+    """Kill -9 at any moment, then the same command: the bits of a render that nothing ended."""
+    command = [
+        sys.executable,
+        "-m",
+        "clvol",
+        "render",
+        str(scene_file(tmp_path, 64)),
+        "--spp",
+        "4000",
+        "--quiet",
+        "-o",
+    ]
     subprocess.run([*command, str(tmp_path / "whole.exr")], check=True, timeout=300)
     again = [*command, str(tmp_path / "a.exr"), "--checkpoint", str(tmp_path / "a.npz"), "--every", "0.001"]
     kills = 0
