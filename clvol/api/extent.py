@@ -7,6 +7,7 @@ import operator
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
+from clvol.api.sharing import check_spread, is_spread
 from clvol.base.arguments import check_seed, positive
 from clvol.errors import OptionError, either, option, shown
 from clvol.planning import registry
@@ -40,6 +41,8 @@ def check_alone(given: Mapping[str, Any], scene_chooses: bool = True) -> None:
     sample_range(1, given["spp"], given["time_limit"], given["samples"])
     if given["seed"] is not None:
         check_seed(given["seed"])
+    if is_spread(given):
+        check_spread(given)
     goes_on = is_checkpoint(given["resume"])
     if given["resume"] is not None and not goes_on:
         check_resumed(given)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from clvol.api.order import Order
 from clvol.api.renders import render
+from clvol.api.spreading import opened
 from clvol.base.arguments import positive
 from clvol.base.interrupts import interruptible
 from clvol.errors import OptionError, RenderError, UnknownOptionError
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Generator
 
     from clvol.api.order import Opened
+    from clvol.api.spreading import SpreadOrder
     from clvol.base.interrupts import Interrupt
     from clvol.scene.records import Scene
 
@@ -107,29 +109,29 @@ class Frames:
 
 def _rendered(order: Order, interval: float, end: _End) -> Generator[Frame, None, None]:
     """The frames of an order, at least `interval` seconds apart."""
-    opened = order.open(callback=None)
-    done = shown = 0
-    due = 0.0
-    try:
-        for done in opened.steps(None, end.urgency):
-            started = time.perf_counter()
-            if started >= due and done < order.count:
-                frame = _frame(opened, done, end, is_last=False)
-                now = time.perf_counter()
-                due = now + (max(interval, (now - started) / _FRAME_SHARE) if interval else 0.0)
-                yield frame
-                if end.cancelled.is_set():
-                    return
-                shown = done
-    except (KeyboardInterrupt, RenderError):
-        if not end.cancelled.is_set():
-            raise
-    if done > shown or not end.cancelled.is_set():
-        yield _frame(opened, done, end, is_last=True)
+    with opened(order, callback=None) as render:
+        done = shown = 0
+        due = 0.0
+        try:
+            for done in render.steps(None, end.urgency):
+                started = time.perf_counter()
+                if started >= due and done < order.count:
+                    frame = _frame(render, done, end, is_last=False)
+                    now = time.perf_counter()
+                    due = now + (max(interval, (now - started) / _FRAME_SHARE) if interval else 0.0)
+                    yield frame
+                    if end.cancelled.is_set():
+                        return
+                    shown = done
+        except (KeyboardInterrupt, RenderError):
+            if not end.cancelled.is_set():
+                raise
+        if done > shown or not end.cancelled.is_set():
+            yield _frame(render, done, end, is_last=True)
 
 
-def _frame(opened: Opened, done: int, end: _End, is_last: bool) -> Frame:
-    result = opened.result(done, final=is_last)
+def _frame(render: Opened | SpreadOrder, done: int, end: _End, is_last: bool) -> Frame:
+    result = render.result(done, final=is_last)
     result.stats["interrupted"] = end.level > 0
     values = {one.name: getattr(result, one.name) for one in fields(Result)}
     return Frame(**values, is_last=is_last, _cancel=end.cancelled.set)

@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any
 from clvol.api.extent import check_alone, sample_range
 from clvol.api.rescue import rescued
 from clvol.api.resuming import Before, check_same, checkpoint_of, resumable, what_is_left
+from clvol.api.sharing import is_spread
 from clvol.base.arguments import check_seed, flag
 from clvol.base.progress import Glance, Progress
+from clvol.cluster.dask import check_client
 from clvol.device.device import open_device
 from clvol.device.driver import driver_errors
 from clvol.errors import DeviceError, OptionError, RenderError
@@ -54,6 +56,7 @@ class Order:
     first, count : samples of each pixel; `spp` is what was given instead.
     transparent : the background was asked to be so.
     denoise : its results get their layer `denoised`.
+    spread : several devices, or workers of a `client`, render it.
     """
 
     scene: Scene
@@ -69,7 +72,9 @@ class Order:
     size: tuple[int, int] | None
     transparent: bool
     denoise: bool
-    device: str | None
+    device: Any
+    client: Any
+    spread: bool
     pool: int | None
     resumed: Result | None
     checkpoint: Checkpoint | None
@@ -121,21 +126,26 @@ class Order:
             transparent=transparent,
             denoise=denoise,
             device=given["device"],
+            client=None if given["client"] is None else check_client(given["client"]),
+            spread=is_spread(given),
             pool=given["pool"],
             resumed=resumed,
             checkpoint=checkpoint,
             saved=saved,
         )
 
+    def planned(self) -> Plan:
+        """What is to be done, as far as it is known without a device and a pilot."""
+        plan = Plan.of(self.scene, self.choices)
+        if self.denoise and plan.guides_denoiser:
+            plan = plan.having(self.choices.but(aov=tuple(dict.fromkeys((*self.choices.aov, *FEATURES)))))
+        return plan
+
     def open(self, callback: ProgressCallback | None, profiler: Profiler | None = None) -> Opened:
         """Plan it, and make it ready on the device; `callback` is told of a pilot."""
         started = time.perf_counter()
         with timed(profiler, "plan"):
-            plan = Plan.of(self.scene, self.choices)
-            choices = self.choices
-            if self.denoise and plan.guides_denoiser:
-                choices = choices.but(aov=tuple(dict.fromkeys((*choices.aov, *FEATURES))))
-                plan = plan.having(choices)
+            plan = self.planned()
         spent = time.perf_counter() - started
         with timed(profiler, "device"):
             device = open_device(self.device)
@@ -145,8 +155,8 @@ class Order:
                 found = self._pilot(device, callback)
             log.info("pilot: %s; %s", ", ".join(f"{k} {v}" for k, v in found.names.items()), found.reason)
             reasons = dict.fromkeys(found.names, "chosen by the pilot")
-            plan = plan.having(choices.but(**found.names), reasons)
-        bounded = self.time_limit is None and choices.target_error is None
+            plan = plan.having(plan.choices.but(**found.names), reasons)
+        bounded = self.time_limit is None and plan.choices.target_error is None
         spp = self.count if bounded else None
         session = Session.for_plan(device, self.scene, plan, self.seed, self.pool, spent, profiler, spp)
         if self.resumed is not None:

@@ -6,6 +6,7 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Any, overload
 
 from clvol.api.order import Order, check_scene
+from clvol.api.spreading import opened
 from clvol.base.arguments import flag
 from clvol.base.interrupts import interruptible
 from clvol.base.notebook import progress_bar
@@ -64,7 +65,8 @@ def render(  # type: ignore[misc]  # the options of several views are those of o
     time_limit: float | None = None,
     target_error: float | None = None,
     denoise: bool = False,
-    device: str | None = None,
+    device: str | Sequence[str | int] | None = None,
+    client: Any = None,
     progress: bool | ProgressCallback = False,
     samples: tuple[int, int] | None = None,
     resume: Result | str | PathLike[str] | None = None,
@@ -114,7 +116,13 @@ def render(  # type: ignore[misc]  # the options of several views are those of o
         Mean relative standard error (`Result.noise`) at which the render ends. A survey that is not in the
         picture judges it, and pixels get samples by their noise. `spp` then is the most on the mean.
     device
-        Index or part of the name of an OpenCL device (see `clvol devices`).
+        Index or part of the name of an OpenCL device (see `clvol devices`). "all", or a list of these: ranges
+        of samples are dealt out to several, by how fast they are; the bits are those of one of their kind
+        that is given as a list.
+    client
+        A `distributed.Client`: the workers of a Dask cluster share the samples, with bits that do not depend
+        on how many they are: those that `merge` makes of the same ranges. Not with a `target_error`,
+        checkpoints, a pilot or a profile.
     progress
         True for a progress bar, in a terminal or a notebook; or a callable that receives
         `clvol.base.progress.Progress` records: how far the render is, its ``image`` so far, its ``noise``.
@@ -153,8 +161,7 @@ def render(  # type: ignore[misc]  # the options of several views are those of o
     order = Order.of("render", scene, given)
     bar = _bar(progress)
     profiler = Profiler() if flag("profile", profile) else None
-    with bar as callback:
-        opened = order.open(callback, profiler)
+    with bar as callback, opened(order, callback, profiler) as render:
         if order.resumed is not None and not order.count:
             order.resumed.stats["interrupted"] = False
             return order.resumed
@@ -162,11 +169,11 @@ def render(  # type: ignore[misc]  # the options of several views are those of o
             interrupt.heed(patience=2)
             done = 0
             with timed(profiler, RENDER):
-                for done in opened.steps(callback, interrupt.urgency):  # noqa: B007
+                for done in render.steps(callback, interrupt.urgency):  # noqa: B007
                     pass
                 interrupt.keep()
             with timed(profiler, "picture"):
-                result = opened.result(done)
+                result = render.result(done)
             result.stats["interrupted"] = interrupt.asked()
     result.profile = profiler.profile(result) if profiler else None
     return result

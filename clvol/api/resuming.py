@@ -12,7 +12,7 @@ from clvol.base.output_files import check_file, check_spares
 from clvol.errors import OptionError, either, option
 from clvol.picture.estimate import Uneven
 from clvol.picture.loading import load_result
-from clvol.picture.merging import differences
+from clvol.picture.parts import differences
 from clvol.picture.result import Result
 from clvol.rendering.checkpoint import Checkpoint, Saved, check_count, is_checkpoint, read_checkpoint
 from clvol.rendering.outcome import metadata_of, picture_names

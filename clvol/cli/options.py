@@ -201,6 +201,21 @@ assignments_option = click.option(
     metavar="NAME=VALUE",
     help="Set a parameter of the scene, as clvol.traverse names it; may be given several times.",
 )
+
+
+def _listed(ctx: click.Context, param: click.Parameter, value: str | None) -> str | list[str] | None:
+    """Several devices, with commas between them, as a list."""
+    if value is None or "," not in value:
+        return value
+    return [part.strip() for part in value.split(",") if part.strip()]
+
+
+devices_option = click.option(
+    "--device",
+    metavar="PATTERN",
+    callback=_listed,
+    help="Part of the device's name, several with commas between them, or all; see clvol devices.",
+)
 device_option = click.option(
     "--device", metavar="PATTERN", help="Part of the device's name; see clvol devices."
 )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from clvol.cli.cluster import client_of, cluster_options
 from clvol.cli.frames import Frames, Series, check_series, frame_options
 from clvol.cli.messages import logging_to
 from clvol.cli.options import (
@@ -17,7 +18,7 @@ from clvol.cli.options import (
     Size,
     assignments_option,
     definitions_option,
-    device_option,
+    devices_option,
     family_options,
     majorant_scale_option,
     outputs_option,
@@ -58,6 +59,7 @@ Examples:
   clvol render scenes/smoke.xml -o smoke.exr --aov cells --aov largest_weight
   clvol render scenes/room.xml -o room.exr --profile --trace room.json
   clvol render scenes/cloud.xml -o cloud.exr --resume --spp 1024
+  clvol render scenes/cloud.xml -o cloud.exr --spp 4096 --scheduler tcp://10.0.0.1:8786
   clvol render scenes/cloud.xml -o cloud.exr --spp 4096 --checkpoint cloud.npz
   clvol render scenes/cloud.xml -o cloud.exr --spp 4096 --resume cloud.npz
 """
@@ -144,7 +146,8 @@ class RenderCommand(ExplainedCommand):
     "noise is; --spp or --time then say how long at most.",
 )
 @click.option("--seed", type=click.IntRange(min=0), help="Same seed, same bits; the scene's own by default.")
-@device_option
+@devices_option
+@cluster_options
 @definitions_option
 @skip_option
 @assignments_option
@@ -204,10 +207,13 @@ def render(
     resumes = options.pop("resume")
     options["resume"] = resumes and _source(resumes, outputs, frames is not None)
     goes_on = resumes == THE_FIRST or options["resume"]
-    check_alone(options | extent | {"resume": goes_on}, scene_chooses=not asked.is_volume)
+    cluster = options.pop("scheduler"), options.pop("workers")
+    sharing = {"client": next((given for given in cluster if given is not None), None)}
+    check_alone(options | extent | sharing | {"resume": goes_on}, scene_chooses=not asked.is_volume)
     console, profiled = error_console(), options.pop("profile")
     options |= extent | {"profile": profiled or trace is not None}
-    with logging_to(console, verbose), _tev_at(tev) as viewer:
+    with logging_to(console, verbose), _tev_at(tev) as viewer, client_of(*cluster) as client:
+        options["client"] = client
         painter = Painter(asked, options, shown, trace, quiet, console, viewer)
         if frames is not None:
             check_series(options, shown, trace, frames)

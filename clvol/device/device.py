@@ -17,7 +17,7 @@ from clvol.device.memory import DeviceMemory
 from clvol.errors import DeviceError, shown
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable
+    from collections.abc import Callable, Hashable, Sequence
 
 _KINDS = ("GPU", "ACCELERATOR", "CPU")
 _POCL = "Portable Computing Language"
@@ -155,6 +155,31 @@ def _usable() -> list[tuple[DeviceInfo, cl.Device]]:
             hint="`pip install pocl-binary-distribution` (Linux x86-64), or install your vendor's driver",
         )
     return drivers.devices
+
+
+ALL = "all"
+"""Instead of a device: every one there is."""
+
+
+def names_several(given: object) -> bool:
+    """Whether this, instead of a device, stands for any number of them: a list, or "all"."""
+    return isinstance(given, list | tuple) or (isinstance(given, str) and given == ALL)
+
+
+def open_devices(given: Sequence[str | int] | str) -> list[Device]:
+    """Open the devices of a list, each as `open_device` takes it, or "all"; none of them twice.
+
+    Raises DeviceError where there is none, or one that is in the list is not there.
+    """
+    if isinstance(given, str) and given == ALL:
+        return [_open(info.index) for info, _ in _usable()]
+    if not given:
+        raise DeviceError("the list of devices is empty", hint=f'name some, or "{ALL}"')
+    opened = [open_device(pattern) for pattern in given]  # type: ignore[arg-type]
+    again = next((device for n, device in enumerate(opened) if device in opened[:n]), None)
+    if again is not None:
+        raise DeviceError(f"{again.info.index}, {again.description}, is listed twice")
+    return opened
 
 
 def open_device(pattern: str | None = None) -> Device:

@@ -15,7 +15,8 @@ import numpy as np
 from clvol.lab.agreement import ROUNDING
 from clvol.lab.digits import with_ends
 from clvol.lab.statistics import Interval, bootstrap, regions, round_variance
-from clvol.rendering.outcome import LARGE_WEIGHT, make_result
+from clvol.rendering.doubts import LARGE_WEIGHT
+from clvol.rendering.outcome import make_result
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -14,7 +14,7 @@ import numpy as np
 
 from clvol.lab.agreement import Agreement, agreement
 from clvol.lab.statistics import round_variance
-from clvol.rendering.outcome import LARGE_WEIGHT
+from clvol.rendering.doubts import LARGE_WEIGHT
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

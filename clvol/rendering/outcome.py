@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import logging
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from clvol import layout
 from clvol.device.driver import driver_errors
-from clvol.errors import Told, option
 from clvol.picture.result import Result, said_ranges
 from clvol.planning import registry
+from clvol.rendering.doubts import Expected, say_doubts, say_seconds
 from clvol.rendering.labels import scenery_of
 from clvol.version import __version__
 
@@ -21,11 +20,8 @@ if TYPE_CHECKING:
     from clvol.rendering.session import Session
     from clvol.scene.records import Scene
 
-log = logging.getLogger("clvol")
 MOST_SAID = 20
 """Parts of a scene that its pictures' metadata have by name."""
-LARGE_WEIGHT = 100.0
-"""Paths that weigh so much more than others are rare: few samples do not show them."""
 
 
 def make_result(session: Session, first: int, count: int, final: bool = True) -> Result:
@@ -50,23 +46,9 @@ def make_result(session: Session, first: int, count: int, final: bool = True) ->
     result.component_format = session.prepared.scene.film.component_format
     result.scenery, result.files = scenery_of(session.prepared), session.prepared.scene.files
     if final:
-        _warn(session, stats)
-        _warn_of_unseen(session, result)
-        _log_seconds(session)
+        say_doubts(result, Expected.of(session))
+        say_seconds(result)
     return result
-
-
-def _warn_of_unseen(session: Session, result: Result) -> None:
-    """Say where the samples do not show the noise that there may be."""
-    features = session.plan.features
-    shines = features.emitters or features.emission or features.glow
-    if result.stats["largest_sample"] == 0 and shines:
-        log.warning("no sample met any light: the picture may be black by chance, its noise is unknown")
-    elif result.met_nothing and not result.variance.any():
-        log.warning(
-            "no path met anything in the media, and all samples are the same: what is rare there has not "
-            "been seen, and the noise is only a bound"
-        )
 
 
 def metadata_of(session: Session, first: int, samples: np.ndarray) -> dict[str, Any]:
@@ -227,45 +209,3 @@ def statistics(session: Session, samples: int) -> dict[str, Any]:
         "energy_lost_to_caps": slots.get("cut_energy", 0.0) / max(paths, 1),
     }
     return stats
-
-
-def _log_seconds(session: Session) -> None:
-    """Where the time went."""
-    log.info(
-        "set-up (volumes, majorants, kernels)  %8.3f seconds, %.3f of them for kernels",
-        session.setup_seconds,
-        session.kernel_seconds,
-    )
-    for stage, seconds in session.wavefront.seconds.items():
-        log.info("stage %-20s %8.3f seconds", stage, seconds)
-
-
-def _warn(session: Session, stats: dict[str, Any]) -> None:
-    """Log what leaves the picture wrong, or noisier than it looks."""
-    features = session.plan.features
-    if features.heterogeneous and not stats["lookups"] and not features.homogeneous:
-        tables = [table for table in session.prepared.majorants if table is not None]
-        dense = any(table.majorant.any() for table in tables)
-        why = "are the transforms right?" if dense else "it is 0 everywhere (a transfer function?)"
-        log.warning("no path met any density: %s", why)
-    for name in ("non_finite", "walks_exhausted"):
-        if stats[name]:
-            log.warning("%s: %d", name.replace("_", " "), stats[name])
-    if stats["majorant_violations"]:
-        log.warning(
-            "%d of %d look-ups were above their majorant: %s",
-            stats["majorant_violations"],
-            stats["lookups"],
-            "the picture is biased"
-            if session.plan.needs_bound
-            else "these techniques stay unbiased, at more noise",
-        )
-    if stats["largest_weight"] > LARGE_WEIGHT:
-        log.warning(
-            Told(
-                "weights grew to %.2g: the picture is noisier than its variance says; raise "
-                f"{option('majorant_scale')}, use {option('probability', 'history')}, or a technique without "
-                "weights"
-            ),
-            stats["largest_weight"],
-        )

@@ -1,0 +1,96 @@
+"""What runs on the workers of a Dask cluster: a worker renders one range at a time."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING
+
+from clvol.cluster.job import Renderer, Stopped
+from clvol.errors import Error, OptionError
+from clvol.version import __version__
+
+if TYPE_CHECKING:
+    from clvol.cluster.job import About, Job
+    from clvol.picture.parts import Part
+
+_turn = threading.Lock()
+"""A worker renders one range at a time, with all of its device."""
+_ready: dict[str, Renderer] = {}
+"""The renderer of the last job, by the job's name."""
+_levels: dict[str, int] = {}
+"""How urgently ends were asked for: of jobs by their names, and of ranges by their keys."""
+
+
+def _here() -> str:
+    """How messages call the worker."""
+    from distributed import get_worker
+
+    return f"worker {get_worker().address}"
+
+
+def _renderer(job: Job) -> Renderer:
+    if job.version != __version__:
+        raise OptionError(
+            f"has clvol {__version__}, and {job.version} renders",
+            hint=f"install the same on all: pip install 'clvol[cluster]=={job.version}'",
+        )
+    if job.name not in _ready:
+        _ready.clear()  # its memory is needed
+        _ready[job.name] = Renderer(job)
+    return _ready[job.name]
+
+
+def _told_from_here(error: Error) -> Error:
+    """The same error, which says where it was."""
+    where = f"{_here()}: {error.where}" if error.where else _here()
+    return type(error)(error.what, where, error.hint)
+
+
+def about(job: Job) -> About:
+    """What the worker makes of a job."""
+    with _turn:
+        try:
+            return _renderer(job).about()
+        except Error as error:
+            raise _told_from_here(error) from None
+
+
+def part_of_range(job: Job, first: int, count: int) -> Part:
+    """The sums of a range, once it is this task's turn."""
+    from distributed import get_worker
+
+    key = get_worker().get_current_task()
+
+    def urgency() -> int:
+        return max(_levels.get(job.name, 0), _levels.get(key, 0))
+
+    with _turn:
+        try:
+            if urgency() > 1:
+                raise Stopped("was to end before it began")
+            return _renderer(job).part(first, count, urgency)
+        except Error as error:
+            raise _told_from_here(error) from None
+        finally:
+            _levels.pop(key, None)
+
+
+def samples(part: Part) -> int:
+    """Of a pixel, in sums that stay where they are."""
+    return part.samples
+
+
+def hurry(name: str, level: int) -> None:
+    """Ask for an end, of a job by its name or of a range by its key, also of one that has not come yet."""
+    _levels[name] = level
+
+
+def forget(name: str) -> None:
+    """End what is left of a job, and free its device; where it renders, once it does not."""
+    _levels[name] = 3
+
+    def free() -> None:
+        with _turn:
+            _ready.pop(name, None)
+
+    threading.Thread(target=free, daemon=True).start()

@@ -1,0 +1,92 @@
+"""What is wrong with a picture, by its statistics, and what its samples may not show: said in the log."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from clvol.errors import Told, option
+
+if TYPE_CHECKING:
+    from clvol.picture.result import Result
+    from clvol.rendering.session import Session
+
+log = logging.getLogger("clvol")
+LARGE_WEIGHT = 100.0
+"""Paths that weigh so much more than others are rare: few samples do not show them."""
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What pictures of a session are judged by; small, for it travels from machine to machine.
+
+    Parameters
+    ----------
+    density : its paths look a density up, if they meet a medium.  dense : there is any.
+    light : there are lights, or media that glow.
+    needs_bound : look-ups above their majorant bias it.
+    """
+
+    density: bool
+    dense: bool
+    light: bool
+    needs_bound: bool
+
+    @classmethod
+    def of(cls, session: Session) -> Expected:
+        """Of a session's plan and tables."""
+        features = session.plan.features
+        tables = [table for table in session.prepared.majorants if table is not None]
+        return cls(
+            bool(features.heterogeneous and not features.homogeneous),
+            any(bool(table.majorant.any()) for table in tables),
+            bool(features.emitters or features.emission or features.glow),
+            session.plan.needs_bound,
+        )
+
+
+def say_doubts(result: Result, expected: Expected) -> None:
+    """Log what leaves the picture wrong, or noisier than it looks."""
+    stats = result.stats
+    if expected.density and not stats["lookups"]:
+        why = "are the transforms right?" if expected.dense else "it is 0 everywhere (a transfer function?)"
+        log.warning("no path met any density: %s", why)
+    for name in ("non_finite", "walks_exhausted"):
+        if stats[name]:
+            log.warning("%s: %d", name.replace("_", " "), stats[name])
+    if stats["majorant_violations"]:
+        log.warning(
+            "%d of %d look-ups were above their majorant: %s",
+            stats["majorant_violations"],
+            stats["lookups"],
+            "the picture is biased"
+            if expected.needs_bound
+            else "these techniques stay unbiased, at more noise",
+        )
+    if stats["largest_weight"] > LARGE_WEIGHT:
+        log.warning(
+            Told(
+                "weights grew to %.2g: the picture is noisier than its variance says; raise "
+                f"{option('majorant_scale')}, use {option('probability', 'history')}, or a technique without "
+                "weights"
+            ),
+            stats["largest_weight"],
+        )
+    if stats["largest_sample"] == 0 and expected.light:
+        log.warning("no sample met any light: the picture may be black by chance, its noise is unknown")
+    elif result.met_nothing and not result.variance.any():
+        log.warning(
+            "no path met anything in the media, and all samples are the same: what is rare there has not "
+            "been seen, and the noise is only a bound"
+        )
+
+
+def say_seconds(result: Result) -> None:
+    """Log where the time went."""
+    seconds = dict(result.stats["seconds"])
+    setup, kernels = seconds.pop("setup"), seconds.pop("kernels")
+    log.info("set-up (volumes, majorants, kernels)  %8.3f seconds, %.3f of them for kernels", setup, kernels)
+    del seconds["render"]
+    for stage, spent in seconds.items():
+        log.info("stage %-20s %8.3f seconds", stage, spent)
