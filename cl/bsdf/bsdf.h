@@ -40,28 +40,6 @@ INLINE Spectrum null_transmission(const Scene *scene, __global const Material *m
     return (Spectrum)(1.0f - opacity);
 }
 
-#if CLVOL_BSDF_BLEND
-/* The same, on the mean over the parts of a mixture. */
-INLINE Spectrum mean_transmission(const Scene *scene, __global const Material *material, float2 uv, float cos_i,
-                                  int channel)
-{
-    if (!IS_BSDF(material, BLEND))
-        return null_transmission(scene, material, uv, cos_i, channel);
-    Spectrum sum = (Spectrum)(0.0f);
-    __global const float *entry = scene->material_tables + material->table;
-    for (int left = (int)*entry++; left > 0; --left) {
-        int number;
-        const float share = blend_part(scene, &entry, uv, &number);
-        if (number >= 0)
-            sum += share * null_transmission(scene, scene->materials + number, uv, cos_i, channel);
-    }
-    return sum;
-}
-#define STRAIGHT_TRANSMISSION mean_transmission
-#else
-#define STRAIGHT_TRANSMISSION null_transmission
-#endif
-
 /* f |cos theta_o| and the pdf, in solid angle, with which bsdf_sample draws wo; 0 and 0 for delta lobes. */
 INLINE Spectrum bsdf_value(const Scene *scene, __global const Material *material, float2 uv, float3 wi, float3 wo,
                            int channel, float *pdf)

@@ -12,6 +12,9 @@ typedef struct {
     float3 s, t; /* tangents; with the shading normal n they make an orthonormal, right-handed frame */
     float3 n;
     float2 uv;
+#if CLVOL_HAS_BUMPS
+    float3 dp_du, dp_dv;
+#endif
     float span; /* magnitude, along ng, of what p was computed from */
     uint shape;
 } Surface;
@@ -75,7 +78,15 @@ INLINE void triangle_surface(const Scene *scene, const Hit *hit, __global const 
         surface->uv = w * ta + u * tb + v * tc;
         if (determinant != 0.0f)
             dp_du = (d2.y * e1 - d1.y * e2) / determinant;
+#if CLVOL_HAS_BUMPS
+        surface->dp_dv = determinant != 0.0f ? (d1.x * e2 - d2.x * e1) / determinant : e2;
+#endif
     }
+#if CLVOL_HAS_BUMPS
+    surface->dp_du = dp_du;
+    if (!CLVOL_HAS_VERTEX_UVS || !shape->uvs)
+        surface->dp_dv = e2;
+#endif
     float3 n = surface->ng;
     if (CLVOL_HAS_SHADING_NORMALS && shape->normals) {
         const float3 smooth = w * vload3(face[0], scene->normals) + u * vload3(face[1], scene->normals) +
@@ -90,6 +101,23 @@ INLINE void triangle_surface(const Scene *scene, const Hit *hit, __global const 
     }
     set_frame(surface, n, dp_du);
 }
+
+#if CLVOL_HAS_BUMPS
+/* Derivatives by (u, v) at a point p of a quadric, in its own space. */
+INLINE void quadric_derivatives(__global const Shape *shape, float3 p, Surface *surface)
+{
+    const float r = sqrt_of(p.x * p.x + p.y * p.y);
+    const float2 out = r > 0.0f ? (float2)(p.x, p.y) / r : (float2)(1.0f, 0.0f);
+    const float3 round = 2.0f * PI * (float3)(-p.y, p.x, 0.0f);
+    float3 dp_du = round, dp_dv = (float3)(0.0f, 0.0f, 1.0f);
+    if (shape->kind == SURFACE_DISK)
+        dp_du = (float3)(out, 0.0f), dp_dv = round;
+    else if (shape->kind == SURFACE_SPHERE)
+        dp_dv = PI * (float3)(p.z * out, -r);
+    surface->dp_du = transform_vector(shape->world_from_local, dp_du);
+    surface->dp_dv = transform_vector(shape->world_from_local, dp_dv);
+}
+#endif
 
 INLINE void quadric_surface(const Scene *scene, Ray ray, const Hit *hit, __global const Shape *shape, Surface *surface)
 {
@@ -118,6 +146,9 @@ INLINE void quadric_surface(const Scene *scene, Ray ray, const Hit *hit, __globa
         dp_du = p.x != 0.0f || p.y != 0.0f ? (float3)(-p.y, p.x, 0.0f) : (float3)(1.0f, 0.0f, 0.0f);
     }
     surface->p = transform_point(shape->world_from_local, p);
+#if CLVOL_HAS_BUMPS
+    quadric_derivatives(shape, p, surface);
+#endif
     /* normals go by the inverse transpose */
     __global const float *m = shape->local_from_world;
     float3 n = normalize((float3)(m[0] * normal.x + m[4] * normal.y + m[8] * normal.z,

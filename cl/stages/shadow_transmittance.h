@@ -8,6 +8,7 @@
 #include "bsdf/bsdf.h"
 #include "stages/boundary.h"
 #include "stages/side.h"
+#include "stages/straight.h"
 #endif
 #include "path/key.h"
 #include "path/tally.h"
@@ -116,7 +117,7 @@ INLINE Spectrum shadow_share(const Scene *scene, uint slot, Tally *tally)
             Side side;
             if (!side_of(scene, scene->shapes + surface.shape, wi, &side))
                 return (Spectrum)(0.0f);
-            through = STRAIGHT_TRANSMISSION(scene, side.material, surface.uv, wi.z, channel);
+            through = STRAIGHT_TRANSMISSION;
             if (!(spectrum_max(share * through) > 0.0f))
                 return share * through;
         }

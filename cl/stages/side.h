@@ -10,6 +10,10 @@
 typedef struct {
     __global const Material *material;
     float side; /* -1 turns local directions round for the back, else 1 */
+#if CLVOL_BSDF_BENT
+    float3 real;  /* shading normal of the surface as it was before it was bent */
+    float alpha2; /* squared roughness that stands for the bend; -1: there is none */
+#endif
 } Side;
 
 INLINE bool side_of(const Scene *scene, __global const Shape *shape, float3 wi, Side *side)

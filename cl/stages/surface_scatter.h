@@ -10,6 +10,7 @@
 #include "path/draws.h"
 #include "path/ray.h"
 #include "path/reset.h"
+#include "stages/bend.h"
 #include "stages/bounce.h"
 #include "stages/boundary.h"
 #include "stages/first_hit.h"
@@ -78,6 +79,9 @@ INLINE bool surface_next_event(const Scene *scene, uint slot, const Draws *draws
     const Spectrum f = bsdf_value(scene, side->material, surface->uv, on_side(side, wi),
                                   on_side(side, to_local(surface, light.direction)), channel, &pdf);
     const float weight = light.pdf > 0.0f ? mis_weight(light.pdf, pdf) : 1.0f;
+#if CLVOL_BSDF_BENT
+    beta *= bend_share(side, surface, light.direction);
+#endif
     Spectrum value = beta * f * to_spectrum(light.value, channel) * weight;
     if (spectrum_max(value) == 0.0f)
         return false;
@@ -121,12 +125,18 @@ INLINE bool leave_surface(const Scene *scene, uint slot, const Draws *draws, con
     return true;
 }
 
+#if CLVOL_BSDF_BENT
+#define VARIED
+#else
+#define VARIED const
+#endif
+
 /* Returns false when the path ends at the surface; `shadow_ray`: whether it made one. */
 INLINE bool shade_surface(const Scene *scene, uint slot, const Draws *draws, bool *shadow_ray)
 {
     const Ray ray = path_ray(scene, slot);
     const Hit hit = path_hit(scene, slot);
-    const Surface surface = hit_surface(scene, ray, &hit);
+    VARIED Surface surface = hit_surface(scene, ray, &hit);
     __global const Shape *shape = scene->shapes + surface.shape;
 #if CLVOL_HAS_AREA && CLVOL_HIDE_EMITTERS /* the camera sees through lamps, as in Mitsuba */
     if (shape->emitter >= 0 && path_bounce(scene, slot) == 0)
@@ -136,7 +146,7 @@ INLINE bool shade_surface(const Scene *scene, uint slot, const Draws *draws, boo
     if (shape->emitter >= 0)
         gather_lamp(scene, slot, ray, &hit, &surface);
 #endif
-    const float3 wi = to_local(&surface, -ray.d);
+    VARIED float3 wi = to_local(&surface, -ray.d);
     Side side;
     if (!side_of(scene, shape, wi, &side))
         return false;
@@ -148,6 +158,9 @@ INLINE bool shade_surface(const Scene *scene, uint slot, const Draws *draws, boo
 #define PICK pick
 #else
 #define PICK uniform_float(k.w)
+#endif
+#if CLVOL_BSDF_BENT
+    bend_surface(scene, &surface, &side, &wi);
 #endif
 #if CLVOL_HAS_PASSABLE
     if (side.material->kind == MATERIAL_NULL)
@@ -178,6 +191,9 @@ INLINE bool shade_surface(const Scene *scene, uint slot, const Draws *draws, boo
     if (!sampled)
         return false;
     const float3 d = unit_of(to_world(&surface, on_side(&side, sample.direction)));
+#if CLVOL_BSDF_BENT
+    beta *= bend_share(&side, &surface, d);
+#endif
     return leave_surface(scene, slot, draws, &surface, d, sample.pdf, sample.eta, beta * sample.weight);
 #else
     return false;

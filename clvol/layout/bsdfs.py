@@ -31,8 +31,9 @@ BSDF_FACTS = {
     "PRINCIPLED_GLASS": BsdfFacts(transmits=True),
     "PRINCIPLED_THIN": BsdfFacts(transmits=True),
     "BLEND": BsdfFacts(smooth=True),
+    "BENT": BsdfFacts(smooth=True),
 }
-"""By name; masks and two-sided ones have none of their own, and a blend has the lobes of what it holds alone.
+"""By name; masks and two-sided ones have none, mixtures and bent ones the lobes of what they hold.
 Principled ones that transmit are of glass."""
 
 BSDFS = tuple(BSDF_FACTS)

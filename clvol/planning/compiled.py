@@ -77,6 +77,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_HAS_MATERIAL_TABLES": int(f.material_tables),
         "CLVOL_HAS_ROUGHNESS_TEXTURES": int(f.rough_textures),
         "CLVOL_VARIED_ROUGHNESS": int(f.rough_textures or any("PRINCIPLED" in name for name in f.bsdfs)),
+        "CLVOL_HAS_BUMPS": int(f.bumps),
         "CLVOL_HAS_REFLECTION": int(f.reflecting),
         "CLVOL_HAS_PASSABLE": int(f.passable),
         "CLVOL_HAS_TRANSMISSION": int(f.transmissive),

@@ -71,6 +71,7 @@ class Features:
     bitmaps: bool = False
     material_tables: bool = False
     rough_textures: bool = False
+    bumps: bool = False
     reflecting: bool = False
     samples_at_surfaces: bool = False
     passable: bool = False

@@ -12,7 +12,17 @@ import numpy as np
 from clvol.base.memory import format_bytes
 from clvol.errors import VolumeError
 from clvol.scene import records
-from clvol.scene.materials import Blend, Bsdf, Dielectric, FrontOnly, Mask, Null, TwoSided
+from clvol.scene.materials import (
+    Blend,
+    Bsdf,
+    BumpMap,
+    Dielectric,
+    FrontOnly,
+    Mask,
+    NormalMap,
+    Null,
+    TwoSided,
+)
 from clvol.scene.tabulated import mean_cosine
 from clvol.scene.vocabulary import listed
 from clvol.volumes import GridInfo, read_volume
@@ -234,6 +244,8 @@ def _bsdf(bsdf: Bsdf) -> str:
             return f"two sided ({_bsdf(bsdf.front)}{back})"
         case Mask():
             return f"mask ({_bsdf(bsdf.nested)})"
+        case NormalMap() | BumpMap():
+            return f"{name} ({_bsdf(bsdf.nested)})"
         case Blend():
             share = f"{_spectrum(bsdf.weight)} of it " if isinstance(bsdf.weight, tuple) else "by a texture "
             return f"blend ({_bsdf(bsdf.first)}, and {share}{_bsdf(bsdf.second)})"

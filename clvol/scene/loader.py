@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from clvol.base.files import files_noted
 from clvol.errors import Error, SceneError, shown
 from clvol.scene import (
+    bends,
     bsdf,
     classified,
     emitter,
@@ -100,6 +101,8 @@ PLUGINS: PluginTable = {
         "twosided": bsdf.twosided,
         "mask": bsdf.mask,
         "blendbsdf": bsdf.blendbsdf,
+        "normalmap": bends.normalmap,
+        "bumpmap": bends.bumpmap,
     },
     "medium": {
         "homogeneous": medium.homogeneous,

@@ -6,8 +6,10 @@ from clvol.layout import BSDF_FACTS, PRINCIPLED_NUMBERS
 from clvol.scene.materials import (
     Bitmap,
     Bsdf,
+    BumpMap,
     Checkerboard,
     Conductor,
+    NormalMap,
     RoughConductor,
     RoughDielectric,
     Texture,
@@ -20,7 +22,7 @@ _COLORS = (
 )
 _REFRACT = {"DIELECTRIC", "ROUGH_DIELECTRIC", "PRINCIPLED_GLASS", "PRINCIPLED_THIN"}
 _NUMBERS = ("alpha_u", "alpha_v", *PRINCIPLED_NUMBERS)
-_TABLES = {"ROUGH_PLASTIC", "PRINCIPLED", "PRINCIPLED_GLASS", "PRINCIPLED_THIN", "BLEND"}
+_TABLES = {"ROUGH_PLASTIC", "PRINCIPLED", "PRINCIPLED_GLASS", "PRINCIPLED_THIN", "BLEND", "BENT"}
 
 
 def _colors(side: Side) -> list[Texture]:
@@ -40,10 +42,29 @@ def _color_is_grey(color: Texture) -> bool:
     return len(set(color)) == 1
 
 
+def bsdf_bends(bsdf: Bsdf) -> list[NormalMap | BumpMap]:
+    """The normal maps and bump maps in it."""
+    return list(dict.fromkeys(side.bend for side in bsdf_parts(bsdf) if side.bend is not None))
+
+
+def _bend_map(bend: NormalMap | BumpMap) -> Bitmap | Checkerboard:
+    """The texture that bends a surface; normals that are the same everywhere need one too."""
+    if isinstance(bend, BumpMap):
+        return bend.texture
+    normals = bend.normalmap
+    return normals if isinstance(normals, Bitmap | Checkerboard) else Checkerboard(normals, normals)
+
+
+def has_bumps(bsdf: Bsdf) -> bool:
+    """Whether a surface is bent by heights, whose slopes are per unit of (u, v)."""
+    return any(isinstance(bend, BumpMap) for bend in bsdf_bends(bsdf))
+
+
 def bsdf_kinds(bsdf: Bsdf) -> set[str]:
     """Names in `layout.BSDFS` of what is on either side."""
-    blended = any(isinstance(look, Mixture) for look in bsdf_looks(bsdf))
-    return {side_kind(side.bsdf) for side in bsdf_parts(bsdf)} | ({"BLEND"} if blended else set())
+    kinds = {side_kind(side.bsdf) for side in bsdf_parts(bsdf)}
+    kinds |= {"BLEND"} if any(isinstance(look, Mixture) for look in bsdf_looks(bsdf)) else set()
+    return kinds | ({"BENT"} if bsdf_bends(bsdf) else set())
 
 
 def is_grey(bsdf: Bsdf) -> bool:
@@ -80,7 +101,7 @@ def samples_lights(bsdf: Bsdf) -> bool:
 def bsdf_textures(bsdf: Bsdf) -> list[Bitmap | Checkerboard]:
     """Its textures, opacities included, in no particular order."""
     found = [t for side in bsdf_parts(bsdf) for t in (*_colors(side), *_numbers(side), *side.opacities)]
-    found += bsdf_weights(bsdf)
+    found += bsdf_weights(bsdf) + [_bend_map(bend) for bend in bsdf_bends(bsdf)]
     return [t for t in found if isinstance(t, Bitmap | Checkerboard)]
 
 

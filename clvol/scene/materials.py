@@ -1,7 +1,7 @@
 """What surfaces are made of: textures and BSDFs as plain frozen records.
 
 As in `records`, nothing here knows Mitsuba's syntax or OpenCL.  A shape's BSDF is a `Bsdf`; wrappers (`Mask`,
-`TwoSided`, `Blend`) hold others.
+`TwoSided`, `Blend`, `NormalMap`, `BumpMap`) hold others.
 """
 
 from __future__ import annotations
@@ -216,6 +216,31 @@ class Blend:
     weight: Texture = (0.5,)
 
 
+@dataclass(frozen=True, eq=False)
+class NormalMap:
+    """`nested` under the normals of a texture, n as the colour (n + 1) / 2 in the surface's frame.
+
+    `flip_invalid_normals`: those seen from behind are turned about the surface's own normal.
+    `use_shadowing_function`: light near the horizon is shadowed, as between facets.
+    """
+
+    nested: Bsdf
+    normalmap: Texture
+    flip_invalid_normals: bool = True
+    use_shadowing_function: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class BumpMap:
+    """`nested` under the normals of a surface of so many heights, times `scale`, above the real one."""
+
+    nested: Bsdf
+    texture: Bitmap
+    scale: float = 1.0
+    flip_invalid_normals: bool = True
+    use_shadowing_function: bool = True
+
+
 Bsdf = (
     Null
     | Diffuse
@@ -231,4 +256,6 @@ Bsdf = (
     | FrontOnly
     | Mask
     | Blend
+    | NormalMap
+    | BumpMap
 )

@@ -234,6 +234,7 @@ _COLOURS = {
     "specular_transmittance",
     "opacity",
     "weight",
+    "normalmap",
     "color0",
     "color1",
     "base_color",
@@ -242,6 +243,7 @@ _COLOURS = {
 _NESTED = {
     **{"front": "brdf_0", "back": "brdf_1", "nested": "nested_bsdf"},
     **{"first": "bsdf_0", "second": "bsdf_1"},
+    "texture": "nested_texture",
 }
 
 
@@ -256,6 +258,8 @@ def _bsdf(bsdf: Any, seen: set[int]) -> Found:
             yield from _nested(_NESTED[name], _bsdf(value, seen))
         elif name in _BSDF_NUMBERS and not isinstance(value, materials.Bitmap | materials.Checkerboard):
             yield name, _field(bsdf, name, values.number(0.0))
+        elif name == "scale" and isinstance(bsdf, materials.BumpMap):
+            yield name, _field(bsdf, name, values.number())
         elif name in ("int_ior", "ext_ior") or (name == "eta" and isinstance(value, float)):
             yield name, _field(bsdf, name, values.number(0.0, exclusive=True))
         elif name in ("eta", "k") and isinstance(value, tuple):
@@ -266,7 +270,7 @@ def _bsdf(bsdf: Any, seen: set[int]) -> Found:
             yield from _nested(name, _bsdf(value, seen))
         elif isinstance(value, materials.Bitmap) and id(value) not in seen:
             seen.add(id(value))
-            yield f"{name}.data", _field(value, "pixels", values.texels, values.frozen)
+            yield f"{_NESTED.get(name, name)}.data", _field(value, "pixels", values.texels, values.frozen)
 
 
 def _emitter(emitter: records.Emitter, _seen: set[int]) -> Found:

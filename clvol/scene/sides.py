@@ -10,12 +10,14 @@ from clvol.scene.materials import (
     Bitmap,
     Blend,
     Bsdf,
+    BumpMap,
     Checkerboard,
     Conductor,
     Dielectric,
     Diffuse,
     FrontOnly,
     Mask,
+    NormalMap,
     Null,
     Plastic,
     Principled,
@@ -49,12 +51,16 @@ MAX_PARTS = 64
 class Side:
     """A surface as seen from one side: a BSDF that is no wrapper, behind masks of these opacities.
 
-    `black`: it absorbs whatever the masks do not let pass.  Equal where the BSDF is the same object.
+    `black`: it absorbs whatever the masks do not let pass.  `bend`: the wrapper that bends its surface,
+    `mirrored` where that lies outside of what makes it two-sided, and is seen from the back.
+    Equal where the BSDF is the same object.
     """
 
     bsdf: Bsdf
     opacities: tuple[Texture, ...] = ()
     black: bool = False
+    bend: NormalMap | BumpMap | None = None
+    mirrored: bool = False
 
 
 @dataclass(frozen=True)
@@ -87,7 +93,7 @@ def bsdf_sides(bsdf: Bsdf) -> tuple[Look | None, Look | None]:
     Raises
     ------
     ValueError
-        A two-sided BSDF round one that light passes.
+        A two-sided BSDF round one that light passes, or a surface that is bent twice.
     """
     if isinstance(bsdf, TwoSided):
         front, back = bsdf_sides(bsdf.front)[0], bsdf_sides(bsdf.back)[0]
@@ -100,10 +106,23 @@ def bsdf_sides(bsdf: Bsdf) -> tuple[Look | None, Look | None]:
     if isinstance(bsdf, Blend):
         first, second = bsdf_sides(bsdf.first), bsdf_sides(bsdf.second)
         return _mixed(first[0], second[0], bsdf.weight), _mixed(first[1], second[1], bsdf.weight)
+    if isinstance(bsdf, NormalMap | BumpMap):
+        front, back = bsdf_sides(bsdf.nested)
+        return _bent(front, bsdf, False), _bent(back, bsdf, True)
     if isinstance(bsdf, Mask):
         return _masked(bsdf)
     side = Side(bsdf)
     return side, side if BSDF_FACTS[side_kind(bsdf)].transmits else None
+
+
+def _bent(look: Look | None, bend: NormalMap | BumpMap, from_back: bool) -> Look | None:
+    if isinstance(look, Mixture):
+        return Mixture(_bent(look.first, bend, from_back), _bent(look.second, bend, from_back), look.weight)
+    if look is None or look.black or isinstance(look.bsdf, Null):
+        return look
+    if look.bend is not None:
+        raise ValueError("a surface is bent once at most")
+    return replace(look, bend=bend, mirrored=from_back and not BSDF_FACTS[side_kind(look.bsdf)].transmits)
 
 
 def _mixed(first: Look | None, second: Look | None, weight: Texture) -> Look | None:

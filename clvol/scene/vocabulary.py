@@ -20,7 +20,7 @@ LATER: dict[str, tuple[str, ...]] = {
     "film": ("specfilm",),
     "shape": ("sdfgrid", "ellipsoids", "ellipsoidsmesh", "heightfield"),
     "bsdf": (
-        *("bumpmap", "normalmap", "measured", "measured_polarized", "hair"),
+        *("measured", "measured_polarized", "hair"),
         *("pplastic", "polarizer", "retarder", "circular"),
     ),
     "phase": ("sggx",),

@@ -1,13 +1,13 @@
 """BSDFs of a scene as what the device reads: one material per distinct side of a surface, and their textures.
 
 Wrappers end here: a `TwoSided` becomes the two materials of a shape, a `Mask` the opacity of a material, a
-`Blend` a material that is a list of others.
+`Blend` a material that is a list of others, a `NormalMap` or `BumpMap` one that names another.
 Nothing here needs a device.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +16,7 @@ from clvol import layout
 from clvol.scene import materials
 from clvol.scene.materials import Bitmap, Bsdf, Checkerboard, Texture
 from clvol.scene.sides import Look, Mixture, Side, bsdf_sides, side_kind
+from clvol.tables.bends import bend_entries
 from clvol.tables.blends import blend_entries
 from clvol.tables.coat import MIN_ALPHA, coat_table, diffuse_reflectance
 from clvol.tables.colours import rgb
@@ -61,7 +62,10 @@ def material_table(bsdfs: Sequence[Bsdf]) -> MaterialTable:
             return BLACK
         if look not in numbers:
             if isinstance(look, Mixture):
-                record = _blend(blend_entries(look, number, textures), tables)
+                record = _wrapper("BLEND", blend_entries(look, number, textures), tables)
+            elif look.bend is not None:
+                inner = number(replace(look, bend=None, mirrored=False))
+                record = _wrapper("BENT", bend_entries(look.bend, inner, look.mirrored, textures), tables)
             else:
                 record = _record(look, textures, tables)
             numbers[look] = len(records)
@@ -121,9 +125,9 @@ def _record(side: Side, textures: TextureTable, tables: list[np.ndarray]) -> np.
     return record
 
 
-def _blend(entries: np.ndarray, tables: list[np.ndarray]) -> np.ndarray:
+def _wrapper(kind: str, entries: np.ndarray, tables: list[np.ndarray]) -> np.ndarray:
     record = np.zeros((), layout.MATERIAL)
-    record["kind"], record["opacity"], record["opacity_texture"] = layout.enum("MATERIAL", "BLEND"), 1.0, -1
+    record["kind"], record["opacity"], record["opacity_texture"] = layout.enum("MATERIAL", kind), 1.0, -1
     _add_table(record, entries, tables)
     return record
 

@@ -25,19 +25,20 @@ class TextureTable:
     def __init__(self) -> None:
         self.records: list[np.ndarray] = []
         self.texels: list[np.ndarray] = []
-        self._numbers: dict[tuple[Bitmap | Checkerboard, bool], int] = {}
+        self._numbers: dict[tuple[Texture, bool], int] = {}
         self._first: dict[tuple[int, bool], int] = {}
         self._used = 0
 
-    def add(self, texture: Bitmap | Checkerboard, as_number: bool = False) -> int:
-        """Number of `texture`; `as_number`: of the one number that Mitsuba makes of each colour.
+    def add(self, texture: Texture, as_number: bool = False) -> int:
+        """Number of `texture`, or of a colour everywhere.
 
-        That is the luminance in a bitmap and the mean elsewhere.
+        `as_number`: of what Mitsuba makes of each colour, the luminance in a bitmap and the mean elsewhere.
         """
         key = (texture, as_number)
         if key not in self._numbers:
             self._numbers[key] = len(self.records)
-            self.records.append(self._record(texture, as_number))
+            varied = Checkerboard(texture, texture) if isinstance(texture, tuple) else texture
+            self.records.append(self._record(varied, as_number))
         return self._numbers[key]
 
     def _record(self, texture: Bitmap | Checkerboard, as_number: bool) -> np.ndarray:

@@ -6,7 +6,7 @@ import pyopencl as cl
 from clvol import layout
 from clvol.device import programs
 from clvol.device.launch import run_kernel
-from clvol.scene import bsdf, texture
+from clvol.scene import bends, bsdf, texture
 from clvol.scene.building import build_whole
 from clvol.scene.library import Library
 from clvol.scene.nodes import from_dict
@@ -20,7 +20,8 @@ PLUGINS = {
             *("roughconductor", "plastic", "roughplastic", "twosided", "mask"),
             *("principled", "principledthin", "blendbsdf"),
         )
-    },
+    }
+    | {"normalmap": bends.normalmap, "bumpmap": bends.bumpmap},
     "texture": {"bitmap": texture.bitmap, "checkerboard": texture.checkerboard},
 }
 
@@ -62,7 +63,7 @@ __kernel void value_probe(SCENE, __global const int *number, __global const floa
     float pdf;
     vstore3((float3)(bsdf_value(&scene, material, vload2(i, uv), in, vload3(i, wo), CHANNEL, &pdf)), 0, o);
     o[3] = pdf;
-    vstore3((float3)(STRAIGHT_TRANSMISSION(&scene, material, vload2(i, uv), in.z, CHANNEL)), 0, o + 4);
+    vstore3((float3)(null_transmission(&scene, material, vload2(i, uv), in.z, CHANNEL)), 0, o + 4);
     o[7] = material_opacity(&scene, material, vload2(i, uv));
 }
 

@@ -18,6 +18,8 @@ FACES = np.array([(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)])
 CELLS = np.linspace(0, 1, 8).reshape(2, 2, 2)
 TEXTURE = {"type": "bitmap", "bitmap": TEXELS}
 VOLUME = {"type": "gridvolume", "data": CELLS}
+OTHER_TEXTURE = {"type": "bitmap", "bitmap": TEXELS[::-1]}
+BENDS = {"flip_invalid_normals": False, "use_shadowing_function": False}
 MOVED, TURNED = translate([1, 2, 3]), rotate([1, 2, 3], 40)
 
 
@@ -277,6 +279,14 @@ PARAMETERS = {
     "blendbsdf": (
         {"weight": 0.5, "a": {"type": "diffuse"}, "b": {"type": "plastic"}},
         {"weight": TEXTURE, "a": {"type": "conductor"}, "b": {"type": "null"}},
+    ),
+    "normalmap": (
+        {"normalmap": RGB, "inner": {"type": "diffuse"}},
+        BENDS | {"normalmap": TEXTURE, "inner": {"type": "plastic"}},
+    ),
+    "bumpmap": (
+        {"heights": TEXTURE, "inner": {"type": "diffuse"}},
+        BENDS | {"heights": OTHER_TEXTURE, "inner": {"type": "plastic"}, "scale": 2.0},
     ),
     "homogeneous": ({"emission": 1.0, "temperature": 900.0, "emission_density": 1.0}, MEDIUM),
     "heterogeneous": (

@@ -30,6 +30,8 @@ from clvol.tables.materials import BLACK, material_table
 RED = {"type": "rgb", "value": [0.8, 0.4, 0.1]}
 CHECKERS = {"type": "checkerboard"}
 DIFFUSE = {"type": "diffuse"}
+PICTURE = {"type": "bitmap", "bitmap": np.zeros((2, 2))}
+BUMPS = {"type": "bumpmap", "a": DIFFUSE, "t": PICTURE}
 BLEND = {"type": "blendbsdf", "weight": 0.25, "a": DIFFUSE, "b": {"type": "dielectric"}}
 
 
@@ -157,7 +159,16 @@ def test_names_of_indices_and_metals():
         (BLEND | {"c": DIFFUSE}, "at most 2 BSDFs, got 3"),
         ({"type": "twosided", "a": BLEND | {"b": {"type": "null"}}}, "takes no BSDF that light passes"),
         ({"type": "twosided", "a": BLEND}, "takes no BSDF that light passes"),
-        ({"type": "bumpmap"}, "not supported in this version"),
+        ({"type": "bumpmap", "a": DIFFUSE}, "takes one texture, of its heights, got 0"),
+        (BUMPS | {"other": PICTURE}, "takes one texture, of its heights, got 2"),
+        (BUMPS | {"b": DIFFUSE}, "takes one BSDF, whose surface it bends, got 2"),
+        (BUMPS | {"t": CHECKERS}, "a 'checkerboard' has no slope"),
+        (BUMPS | {"scale": np.inf}, "finite"),
+        (BUMPS | {"a": BUMPS}, "bent twice"),
+        ({"type": "normalmap", "a": DIFFUSE}, "needs a normalmap"),
+        ({"type": "normalmap", "normalmap": rgb(0, 2, 0), "a": DIFFUSE}, r"in \[0, 1\]"),
+        ({"type": "normalmap", "normalmap": rgb(0, 1, 0)}, "takes one BSDF, whose surface it bends, got 0"),
+        ({"type": "measured"}, "not supported in this version"),
         ({"type": "principled", "eta": 1.5, "specular": 0.5}, "either eta or specular"),
         ({"type": "principled", "specular": 12.5}, "must be"),
         ({"type": "principled", "metallic": 1.5}, "must be"),
@@ -236,6 +247,27 @@ def test_mixtures_of_mixtures_are_bounded():
     assert len(bsdf_parts(read(found))) == 64
     with pytest.raises(SceneError, match="at most 64 BSDFs, got 128"):
         read({"type": "blendbsdf", "weight": 0.5, "a": found, "b": found})
+
+
+def test_bent_surfaces_are_materials_that_name_others():
+    both = {"type": "twosided", "b": DIFFUSE}
+    board = rgb(0.25, 0.5, 1)
+    table = table_of(
+        {"type": "normalmap", "normalmap": board, "a": both},
+        {"type": "twosided", "a": BUMPS | {"scale": 3.0, "flip_invalid_normals": False}},
+        {
+            "type": "normalmap",
+            "normalmap": board,
+            "a": {"type": "dielectric"},
+            "use_shadowing_function": False,
+        },
+    )
+    assert table.sides.tolist() == [[1, 2], [4, 4], [6, 6]]  # the back of a map round both sides is mirrored
+    assert kinds(table) == ["DIFFUSE", "BENT", "BENT", "DIFFUSE", "BENT", "DIELECTRIC", "BENT"]
+    entries = table.tables.reshape(-1, 7).tolist()
+    assert entries[:2] == [[0, 0, 0, 1, 1, 1, 0], [0, 0, 0, 1, 1, 1, 1]]
+    assert entries[2:] == [[3, 1, 1, 3, 0, 1, 0], [5, 0, 0, 1, 1, 0, 0]]
+    assert table_of(BUMPS | {"a": {"type": "null"}}).sides.tolist() == [[0, 0]]
 
 
 def test_each_object_once():
