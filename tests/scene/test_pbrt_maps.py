@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from clvol.scene.pbrt import cloud
 from clvol.scene.pbrt.cloud import cloud_density, noise
 from clvol.scene.pbrt.colours import glow, to_srgb
 from clvol.scene.pbrt.lights import latitudes_and_longitudes, square_place
@@ -13,7 +14,17 @@ from clvol.scene.spectra import Y_INTEGRAL
 
 def test_noise_is_that_of_perlins_reference():
     """The value of his Java program at this point."""
-    assert noise(np.array([3.14, 42.0, 7.0])) == pytest.approx(0.13691995878400012, abs=1e-12)
+    assert noise(*np.array([[3.14], [42.0], [7.0]])) == pytest.approx(0.13691995878400012, abs=1e-12)
+
+
+def test_gradients_are_those_of_pbrts_source():
+    """Their first part is x, or y for 8 to 11, 14 and 15; the second y or z; the last bits are signs."""
+    way = np.array([0.3, 0.5, 0.7])
+    for hashed in range(16):
+        first = way[0] if hashed < 8 or hashed in (12, 13) else way[1]
+        second = way[1] if hashed < 4 or hashed in (12, 13) else way[2]
+        expected = (-first if hashed & 1 else first) + (-second if hashed & 2 else second)
+        assert cloud._slope(np.array([hashed]), *way)[0] == pytest.approx(expected)
 
 
 def test_a_cloud_is_solid_below():

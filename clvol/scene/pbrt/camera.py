@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.scene.pbrt.directives import State, Thing
+from clvol.scene.pbrt.statements import State, Thing
 from clvol.scene.sensor import MAX_SIDE
 from clvol.scene.transforms import keeps_angles, scale
 from clvol.scene.vocabulary import listed

@@ -19,7 +19,12 @@ _TABLE = bytes.fromhex(
     "4e42d73d9cb4"
 )
 """The permutation of 0..255 in Perlin's reference implementation."""
-_PERMUTATION = np.frombuffer(_TABLE * 2, np.uint8).astype(np.int32)
+_PERMUTATION = np.frombuffer(_TABLE * 2, np.uint8).astype(np.intp)
+_EDGES = ["xy", "Xy", "xY", "XY", "xz", "Xz", "xZ", "XZ", "yz", "Yz", "yZ", "YZ", "xy", "Xy", "yZ", "YZ"]
+_GRADIENTS = np.array([[(a in e) - (a.upper() in e) for e in _EDGES] for a in "xyz"], float)[
+    :, np.arange(256) & 15
+]
+"""Perlin's, by axis and the last four bits: capitals point backwards."""
 _DELTA = 0.01
 
 
@@ -51,55 +56,69 @@ def _slice(
     x: np.ndarray, y: np.ndarray, z: float, density: float, wispiness: float, frequency: float
 ) -> np.ndarray:
     """The density in a plane, (ny, nx)."""
-    p = np.stack(np.broadcast_arrays(x[None, :], y[:, None], z), axis=-1)
-    at = frequency * p
+    found = np.ones((len(y), len(x)), np.float32)
+    above = y > 0  # it is solid below, whatever the noise
+    if above.any():
+        found[above] = _wisps(x, y[above], z, density, wispiness, frequency)
+    return found
+
+
+def _wisps(
+    x: np.ndarray, y: np.ndarray, z: float, density: float, wispiness: float, frequency: float
+) -> np.ndarray:
+    at = [np.array(part, float) for part in np.broadcast_arrays(x[None, :], y[:, None], z)]
+    at = [frequency * part for part in at]
     if wispiness > 0:
-        omega, scale = 0.05 * wispiness, 10.0
+        omega, factor = 0.05 * wispiness, 10.0
         for _ in range(2):
-            at = at + omega * _gradient(scale * at)
-            omega, scale = omega / 2, scale * 1.99
-    total, omega, scale = np.zeros(p.shape[:-1]), 0.5, 1.0
+            slopes = _gradient([factor * part for part in at])
+            at = [part + omega * slope for part, slope in zip(at, slopes, strict=True)]
+            omega, factor = omega / 2, factor * 1.99
+    total, omega, factor = np.zeros((len(y), len(x))), 0.5, 1.0
     for _ in range(5):
-        total += omega * noise(scale * at)
-        omega, scale = omega / 2, scale * 1.99
-    altitude = p[..., 1]
+        total += omega * noise(*(factor * part for part in at))
+        omega, factor = omega / 2, factor * 1.99
+    altitude = y[:, None]
     wisps = np.clip((1 - altitude) * 4.5 * density * total, 0, 1)
     solid: np.ndarray = np.clip(wisps + 2 * np.maximum(0, 0.5 - altitude), 0, 1)
     return solid
 
 
-def _gradient(p: np.ndarray) -> np.ndarray:
+def _gradient(p: list[np.ndarray]) -> list[np.ndarray]:
     """Differences of the noise over a small step along each axis."""
-    here = noise(p)
-    steps = _DELTA * np.eye(3)
-    return np.stack([(noise(p + step) - here) / _DELTA for step in steps], axis=-1)
+    here = noise(*p)
+    moved = ([part + _DELTA * (n == axis) for n, part in enumerate(p)] for axis in range(3))
+    return [(noise(*place) - here) / _DELTA for place in moved]
 
 
-def noise(p: np.ndarray) -> np.ndarray:
-    """Perlin's improved noise at points (..., 3)."""
-    p = np.fmod(p, 2.0**30)
-    cell = np.floor(p)
-    d = p - cell
-    cell = cell.astype(np.int64) & 255
-    weight = ((6 * d - 15) * d + 10) * d**3
-    total = np.zeros(p.shape[:-1])
-    for corner in np.ndindex(2, 2, 2):
-        hashed = np.zeros(p.shape[:-1], np.int64)
-        share = np.ones(p.shape[:-1])
-        for axis, step in enumerate(corner):
-            hashed = (
-                _PERMUTATION[hashed + cell[..., axis] + step] if axis else _PERMUTATION[cell[..., 0] + step]
-            )
-            share = share * (weight[..., axis] if step else 1 - weight[..., axis])
-        total += share * _slope(hashed & 15, d - np.array(corner))
+def noise(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Perlin's improved noise at points (x, y, z)."""
+    cells, ways, weights = [], [], []
+    for part in (x, y, z):
+        whole = np.floor(part)
+        way = part - whole
+        cells.append(np.fmod(whole, 256).astype(np.intp) & 255)
+        ways.append((way, way - 1))
+        weights.append(((6 * way - 15) * way + 10) * way**3)
+    first = [_PERMUTATION.take(cells[0] + n) + cells[1] for n in range(2)]
+    second = [[_PERMUTATION.take(row + n) + cells[2] for n in range(2)] for row in first]
+    along_x = []
+    for i in range(2):
+        along_y = []
+        for j in range(2):
+            ends = [
+                _slope(_PERMUTATION.take(second[i][j] + k), ways[0][i], ways[1][j], ways[2][k])
+                for k in (0, 1)
+            ]
+            along_y.append(ends[0] + weights[2] * (ends[1] - ends[0]))
+        along_x.append(along_y[0] + weights[1] * (along_y[1] - along_y[0]))
+    total: np.ndarray = along_x[0] + weights[0] * (along_x[1] - along_x[0])
     return total
 
 
-def _slope(h: np.ndarray, d: np.ndarray) -> np.ndarray:
-    """One of twelve gradients, times the way from the corner."""
-    x, y, z = d[..., 0], d[..., 1], d[..., 2]
-    twelve = (h == 12) | (h == 13)
-    u = np.where((h < 8) | twelve, x, y)
-    v = np.where((h < 4) | twelve, y, z)
-    slope: np.ndarray = np.where(h & 1, -u, u) + np.where(h & 2, -v, v)
+def _slope(hashed: np.ndarray, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """One of twelve gradients, four of them twice, times the way from the corner."""
+    slope: np.ndarray = _GRADIENTS[0].take(hashed) * x
+    slope += _GRADIENTS[1].take(hashed) * y
+    slope += _GRADIENTS[2].take(hashed) * z
     return slope

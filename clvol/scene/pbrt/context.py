@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from clvol.scene.faults import Faults
-    from clvol.scene.pbrt.directives import Read
     from clvol.scene.pbrt.parameters import Parameters
+    from clvol.scene.pbrt.statements import Read
 
 
 class Context:

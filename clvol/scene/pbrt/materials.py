@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from clvol.scene.pbrt.context import Context
-    from clvol.scene.pbrt.directives import Thing
     from clvol.scene.pbrt.parameters import Parameters
+    from clvol.scene.pbrt.statements import Thing
     from clvol.scene.pbrt.textures import Textures
 
 SMOOTH = 1e-3

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from clvol.scene.pbrt.context import Context
-    from clvol.scene.pbrt.directives import Thing
     from clvol.scene.pbrt.parameters import Parameters
+    from clvol.scene.pbrt.statements import Thing
 
 MOST_CLOUDED = 1e4
 """Largest frequency and wispiness of a cloud."""

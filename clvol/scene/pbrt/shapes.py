@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from clvol.scene.nodes import Node
     from clvol.scene.pbrt.context import Context
-    from clvol.scene.pbrt.directives import Thing
     from clvol.scene.pbrt.parameters import Parameters
+    from clvol.scene.pbrt.statements import Thing
     from clvol.scene.records import Mesh
 
 MOST_LEVELS = 8

@@ -14,8 +14,8 @@ from clvol.scene.pbrt.colours import colour
 
 if TYPE_CHECKING:
     from clvol.scene.pbrt.context import Context
-    from clvol.scene.pbrt.directives import Thing
     from clvol.scene.pbrt.parameters import Parameters
+    from clvol.scene.pbrt.statements import Thing
 
 _WRAPS = {"repeat": "repeat", "clamp": "clamp", "black": "clamp", "octahedralsphere": "repeat"}
 

@@ -11,7 +11,7 @@ from clvol.base.files import other_kind
 from clvol.errors import SceneError
 from clvol.scene.pbrt.camera import Pictures
 from clvol.scene.pbrt.context import Context
-from clvol.scene.pbrt.directives import Directives, Thing
+from clvol.scene.pbrt.directives import Directives
 from clvol.scene.pbrt.lights import Lights
 from clvol.scene.pbrt.materials import Materials
 from clvol.scene.pbrt.media import Media
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from clvol.scene.faults import Faults
     from clvol.scene.nodes import Node
     from clvol.scene.pbrt.parameters import Parameters
+    from clvol.scene.pbrt.statements import Thing
 
 SUFFIXES = (".pbrt", ".pbrt.gz")
 """How names of such scenes end."""
