@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-os.environ.setdefault("CLVOL_BUILD_PROCESSES", "1")  # the tests' own processes use every core
+for variable in ("CLVOL_BUILD_PROCESSES", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")  # the tests' own processes use every core
 
 OTHERS = {
     "mitsuba": ("Mitsuba 3.9", "CLVOL_MITSUBA"),
