@@ -15,8 +15,10 @@ from clvol.base.masks import as_array, masked_count
 from clvol.errors import SceneError, shown
 from clvol.scene import spectra
 from clvol.scene.faults import UnsupportedError
+from clvol.scene.lookup import find
 from clvol.scene.nodes import NAMELESS, Node
 from clvol.scene.records import SpectrumColor
+from clvol.scene.spectrum_files import read_spectrum
 from clvol.scene.transforms import as_matrix
 from clvol.scene.vocabulary import did_you_mean, join_hints, listed
 
@@ -235,6 +237,15 @@ class Reader:
             )
         return node["value"]
 
+    def _from_file(self, name: str, node: Node) -> Any:
+        """The pairs in the file that a spectrum names."""
+        if others := [key for key, _ in node.parameters() if key != "filename"]:
+            self.fail(f"a spectrum takes either a filename or a {others[0]}", name)
+        file, where = node["filename"], self.place(name)
+        if not isinstance(file, str):
+            self._wrong(name, "the name of a file", file)
+        return read_spectrum(find(file, node.folders, where), where)
+
     def _rgb(self, name: str, node: Node) -> np.ndarray:
         value = self._colour_value(name, node)
         try:
@@ -246,7 +257,7 @@ class Reader:
         return rgb
 
     def _spectrum(self, name: str, node: Node, light: bool, maximum: float) -> np.ndarray:
-        value = self._colour_value(name, node)
+        value = self._from_file(name, node) if "filename" in node else self._colour_value(name, node)
         if isinstance(value, Real) and not isinstance(value, bool):
             return spectra.constant_to_rgb(_float(value)) if light else np.array([_float(value)])
         try:

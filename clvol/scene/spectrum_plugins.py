@@ -23,21 +23,24 @@ MAX_NUMBERS = 1 << 16
 
 
 def uniform(reader: Reader) -> SpectrumColor:
-    """The `uniform` spectrum, and `rawconstant`: the same value, which is a grey one."""
+    """The `uniform` spectrum: the same value, which is a grey one."""
     grey = np.array([reader.number("value", 1.0)])
     return SpectrumColor(grey, grey)
 
 
+def rawconstant(reader: Reader) -> SpectrumColor:
+    """The `rawconstant` spectrum: a number, or three in a row."""
+    return _given(reader.vector("value", 1.0)) if _is_row(reader, "value") else uniform(reader)
+
+
 def srgb(reader: Reader) -> SpectrumColor:
     """The `srgb` spectrum: its colour."""
-    color = np.array(reader.color("color", 1.0))
-    return SpectrumColor(color, color)
+    return _given(_color(reader))
 
 
 def d65(reader: Reader) -> SpectrumColor:
     """The `d65` spectrum: daylight is white, times `color` and `scale`."""
-    color = reader.number("scale", 1.0) * np.array(reader.color("color", 1.0))
-    return SpectrumColor(color, color)
+    return _given(reader.number("scale", 1.0) * _color(reader))
 
 
 def regular(reader: Reader) -> SpectrumColor:
@@ -73,13 +76,27 @@ def blackbody(reader: Reader) -> SpectrumColor:
 
 SPECTRA = {
     "uniform": uniform,
-    "rawconstant": uniform,
+    "rawconstant": rawconstant,
     "srgb": srgb,
     "d65": d65,
     "regular": regular,
     "irregular": irregular,
     "blackbody": blackbody,
 }
+
+
+def _given(color: np.ndarray) -> SpectrumColor:
+    """A colour that is the same of lights and of surfaces."""
+    return SpectrumColor(color, color)
+
+
+def _color(reader: Reader) -> np.ndarray:
+    """The parameter `color`: an rgb, or three numbers in a row."""
+    return reader.vector("color", 1.0) if _is_row(reader, "color") else np.array(reader.color("color", 1.0))
+
+
+def _is_row(reader: Reader, name: str) -> bool:
+    return isinstance(reader.node.get(name), list | tuple | np.ndarray)
 
 
 def _sampled(wavelengths: np.ndarray, values: np.ndarray) -> SpectrumColor:

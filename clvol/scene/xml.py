@@ -18,7 +18,7 @@ from clvol.base.kinds import kind_of_file
 from clvol.errors import SceneError, either, shortened, shown
 from clvol.scene import transforms
 from clvol.scene.faults import Faults, UnsupportedError
-from clvol.scene.files import find
+from clvol.scene.lookup import find
 from clvol.scene.nodes import NAMELESS, Node
 from clvol.scene.upgrade import upgraded
 from clvol.scene.vocabulary import did_you_mean, join_hints, listed
@@ -252,7 +252,7 @@ class _XmlReader:
             _add_child(parent, self.substitute(element.attributes.get("name", ""), element), node)
         elif tag in VALUE_TAGS:
             _no_children(element)
-            name, value = self.value(element)
+            name, value = self.value(element, parent.folders)
             parent.add(name, value, element.where)
         elif tag == "transform":
             name = self.attributes(element, "!name")["name"]
@@ -303,12 +303,18 @@ class _XmlReader:
 
     # -- values ------------------------------------------------------------------------------------
 
-    def value(self, element: Element) -> tuple[str, object]:
+    def value(self, element: Element, folders: list[Path]) -> tuple[str, object]:
         """(name, value) of a <float>, <integer>, …, <vector>."""
         tag = element.tag
         if tag in ("point", "vector"):
             attributes = self.attributes(element, "!name", "value", "x", "y", "z")
             return attributes["name"], parse_xyz(element, attributes)
+        if tag == "spectrum" and "filename" in element.attributes:
+            attributes = self.attributes(element, "!name", "!filename")
+            node = Node(element.where, folders=folders)
+            node.add("type", tag, element.where)
+            node.add("filename", attributes["filename"], element.where)
+            return attributes["name"], node
         attributes = self.attributes(element, "!name", "!value")
         name, text = attributes["name"], attributes["value"]
         if tag == "float":

@@ -24,6 +24,9 @@ def reflectance(**plugin):
         ({"type": "uniform", "value": 0.5}, (0.5,)),
         ({"type": "uniform"}, (1.0,)),
         ({"type": "rawconstant", "value": 0.3}, (0.3,)),
+        ({"type": "rawconstant", "value": [0.1, 0.2, 0.3]}, (0.1, 0.2, 0.3)),
+        ({"type": "srgb", "color": [0.1, 0.2, 0.3]}, (0.1, 0.2, 0.3)),
+        ({"type": "d65", "color": np.array([0.1, 0.2, 0.3])}, (0.1, 0.2, 0.3)),
         ({"type": "srgb", "color": {"type": "rgb", "value": [0.1, 0.2, 0.3]}}, (0.1, 0.2, 0.3)),
         ({"type": "d65"}, (1.0,)),
         ({"type": "d65", "scale": 0.5, "color": {"type": "rgb", "value": [0.2, 0.4, 0.6]}}, (0.1, 0.2, 0.3)),
@@ -98,6 +101,10 @@ def test_they_are_read_from_xml_and_by_ref():
             "3 wavelengths have 2 values",
         ),
         ({"type": "irregular", "values": "1, 2", "wavelengths": "500, 400"}, "must increase"),
+        ({"type": "rawconstant", "value": [1.0, 2.0]}, "three finite numbers"),
+        ({"type": "rawconstant", "value": [1.0, 2.0, -1.0]}, "'radiance' .* must be in"),
+        ({"type": "srgb", "color": [1.0, np.nan, 0.0]}, "three finite numbers"),
+        ({"type": "uniform", "value": [1.0, 1.0, 1.0]}, "must be a number"),
         ({"type": "blackbody", "temperature": 0.0}, "temperature"),
         ({"type": "blackbody", "scale": 2.0}, "unknown parameter 'scale'"),
     ],
@@ -105,3 +112,66 @@ def test_they_are_read_from_xml_and_by_ref():
 def test_what_makes_no_spectrum_is_refused(plugin, message):
     with pytest.raises(clvol.SceneError, match=message):
         light(**plugin)
+
+
+PAIRS = [(400.0, 0.1), (500.0, 0.7), (600.0, 0.3), (700.0, 0.9)]
+FILE = "# a comment\n400 0.1\n500\t0.7 # another\n\n600 3e-1\r\n700 0.9"
+
+
+def test_spectra_are_read_from_files(tmp_path, monkeypatch):
+    """Mitsuba 3.9.1 has these colours in them, in scalar_rgb."""
+    (tmp_path / "a.spd").write_text(FILE)
+    monkeypatch.chdir(tmp_path)
+    assert reflectance(type="spectrum", filename="a.spd") == pytest.approx(
+        (0.311179, 0.550709, 0.413553), rel=1e-4
+    )
+    assert light(type="spectrum", filename="a.spd") == light(type="spectrum", value=PAIRS)
+
+
+def test_files_of_spectra_are_relative_to_the_scene(tmp_path):
+    (tmp_path / "a.spd").write_text(FILE)
+    text = (
+        '<scene version="{}"><sensor type="perspective"/><emitter type="{}">'
+        '<spectrum name="{}" filename="a.spd"/></emitter></scene>'
+    )
+    (tmp_path / "new.xml").write_text(text.format("3.0.0", "constant", "radiance"))
+    (tmp_path / "old.xml").write_text(text.format("0.5.0", "constant", "radiance"))
+    for name in ("new.xml", "old.xml"):
+        [emitter] = clvol.load_file(str(tmp_path / name)).emitters
+        assert emitter.radiance == light(type="spectrum", value=PAIRS)
+    assert str(tmp_path / "a.spd") in clvol.load_file(str(tmp_path / "new.xml")).files
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"400 1\n500 x", "line 2 of 'a.spd' is no wavelength and value: '500 x'"),
+        (b"400 1 2\n500 1", "line 1"),
+        (b"", "at least two wavelength:value pairs"),
+        (b"500 1\n400 1", "increasing wavelengths"),
+        (b"400 1\n500 nan", "increasing wavelengths"),
+        (b"400 1\n500 -1", "values >= 0"),
+        (bytes(range(256)), "is no wavelength"),
+        (b"400 1\n" * 300_000, "too long"),
+    ],
+    ids=lambda value: "",
+)
+def test_broken_files_of_spectra_are_refused(content, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.spd").write_bytes(content)
+    with pytest.raises(clvol.SceneError, match=message):
+        light(type="spectrum", filename="a.spd")
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"filename": "b.spd"}, "'b.spd' does not exist"),
+        ({"filename": "b.spd", "value": 1.0}, "either a filename or a value"),
+        ({"filename": 3}, "the name of a file"),
+    ],
+    ids=lambda value: "",
+)
+def test_mistakes_with_files_of_spectra_are_named(given, message):
+    with pytest.raises(clvol.SceneError, match=message):
+        light(type="spectrum", **given)

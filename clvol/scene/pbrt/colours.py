@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.errors import SceneError, shortened
-from clvol.scene.files import find
+from clvol.scene.lookup import find
 from clvol.scene.pbrt.tokens import read_bytes
 from clvol.scene.refraction import METALS
 from clvol.scene.spectra import XYZ_TO_SRGB, Y_INTEGRAL, observer, sampled_to_rgb

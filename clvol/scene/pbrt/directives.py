@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clvol.errors import SceneError, shortened
-from clvol.scene.files import find
+from clvol.scene.lookup import find
 from clvol.scene.pbrt.colours import SPACES
 from clvol.scene.pbrt.parameters import read_parameters
 from clvol.scene.pbrt.statements import Read, State, Thing

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.base.rows import bands
-from clvol.scene.files import find
 from clvol.scene.image import read_image
+from clvol.scene.lookup import find
 from clvol.scene.pbrt.colours import light_colour, white
 from clvol.scene.vocabulary import did_you_mean, join_hints, listed
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clvol.errors import SceneError, shortened
-from clvol.scene.files import find
+from clvol.scene.lookup import find
 from clvol.scene.nodes import Node
 from clvol.scene.pbrt.cloud import SAMPLES, cloud_density
 from clvol.scene.pbrt.colours import glow, light_colour, to_srgb

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.scene.files import find
+from clvol.scene.lookup import find
 from clvol.scene.mesh import RawMesh, build_mesh
 from clvol.scene.pbrt.tokens import read_bytes
 from clvol.scene.ply import read_ply

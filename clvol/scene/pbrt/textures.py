@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.scene.files import find
 from clvol.scene.image import read_image
+from clvol.scene.lookup import find
 from clvol.scene.nodes import MAX_DEPTH, Node
 from clvol.scene.pbrt.colours import colour
 
