@@ -102,7 +102,7 @@ def test_a_volume_is_no_scene_in_either_language(nan: Path) -> None:
 def test_no_message_of_the_library_is_in_one_language_alone() -> None:
     """Options by the words of Python or of the command line are spelled by `clvol.errors`."""
     names = {*inspect.signature(clvol.render).parameters, *inspect.signature(clvol.volume_scene).parameters}
-    names -= {"scene", "progress", "aov"}  # what the command line cannot give wrongly
+    names -= {"scene", "progress", "aov", "client"}  # what the command line cannot give wrongly
     wrong = re.compile(rf"(?<![\w-])--[a-z]|\b({'|'.join(sorted(names))})=|`clvol \w+ |max_bytes")
     found = []
     for path in sorted((ROOT / "clvol").rglob("*.py")):

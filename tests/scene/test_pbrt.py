@@ -245,6 +245,13 @@ def test_mistakes_are_told_where_they_are(load, world, told):
     assert told in str(caught.value) and "scene.pbrt:" in str(caught.value)
 
 
+@pytest.mark.parametrize("text", ["", "# nothing\n", CAMERA])
+def test_a_file_that_stops_before_its_world_is_no_scene(tmp_path, text):
+    (tmp_path / "scene.pbrt").write_text(text)
+    with pytest.raises(clvol.SceneError, match="scene.pbrt.*without WorldBegin.*cut short"):
+        clvol.load_file(tmp_path / "scene.pbrt")
+
+
 def test_info_tells_of_a_scene(load, tmp_path):
     load('Shape "sphere" LightSource "infinite"')
     told = str(clvol.info(tmp_path / "scene.pbrt"))

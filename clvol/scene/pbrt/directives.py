@@ -21,10 +21,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 MAX_STACK = 10_000
-_TARGETS = ("shape", "light", "material", "medium", "texture")
-
-
 MAX_SHAPES = 1_000_000
+_WORLD = "world"
+_TARGETS = ("shape", "light", "material", "medium", "texture")
 _OPTIONS = ("Camera", "Film", "Sampler", "Integrator", "PixelFilter", "Accelerator")
 
 
@@ -65,6 +64,8 @@ class Directives:
             raise SceneError(f"{self._stack[-1][0]} without its end", self._stack[-1][2])
         if self._object is not None:
             raise SceneError(f"ObjectBegin '{shortened(self._object, 60)}' without its end", self.tokens.end)
+        if _WORLD not in self._systems:
+            raise SceneError("a scene without WorldBegin", self.tokens.end, "the file is empty, or was cut short")
         return self.read
 
     # -- pieces --------------------------------------------------------------------------------------
@@ -180,7 +181,7 @@ class Directives:
     def world_begin(self, token: Token) -> None:
         """What follows is the scene, in world space."""
         self.state = replace(self.state, ctm=np.eye(4))
-        self._systems["world"] = np.eye(4)
+        self._systems[_WORLD] = np.eye(4)
         self._active = True
 
     def object_begin(self, token: Token) -> None:

@@ -81,7 +81,7 @@ class Tokens:
         self._open: list[_Source] = []
         self._kept: list[Token] = []
         self._files = 0
-        self.end = ""  # where the last token was
+        self.end = str(path)  # where the last token was
         self.include(path, "")
 
     def include(self, path: Path, where: str) -> None:
