@@ -248,7 +248,7 @@ def test_mistakes_are_told_where_they_are(load, world, told):
 @pytest.mark.parametrize("text", ["", "# nothing\n", CAMERA])
 def test_a_file_that_stops_before_its_world_is_no_scene(tmp_path, text):
     (tmp_path / "scene.pbrt").write_text(text)
-    with pytest.raises(clvol.SceneError, match="scene.pbrt.*without WorldBegin.*cut short"):
+    with pytest.raises(clvol.SceneError, match=r"scene.pbrt.*without WorldBegin.*cut short"):
         clvol.load_file(tmp_path / "scene.pbrt")
 
 

@@ -65,7 +65,9 @@ class Directives:
         if self._object is not None:
             raise SceneError(f"ObjectBegin '{shortened(self._object, 60)}' without its end", self.tokens.end)
         if _WORLD not in self._systems:
-            raise SceneError("a scene without WorldBegin", self.tokens.end, "the file is empty, or was cut short")
+            raise SceneError(
+                "a scene without WorldBegin", self.tokens.end, "the file is empty, or was cut short"
+            )
         return self.read
 
     # -- pieces --------------------------------------------------------------------------------------
