@@ -11,6 +11,7 @@
 #include "medium/albedo.h"
 #endif
 #include "phase/phase.h"
+#include "phase/varied.h"
 #if CLVOL_HAS_SCATTERING
 #include "stages/bounce.h"
 #include "stages/direction_control.h"
@@ -73,7 +74,7 @@ INLINE bool next_event(const Scene *scene, uint slot, const Draws *draws, __glob
     const uint4 k = drawn_block(scene, draws, BLOCK_LIGHT);
     const LightSample light = sample_light(scene, p, uniform_below_one(k.x), uniform_below_one(k.y),
                                            uniform_below_one(k.z));
-    const float pdf = phase_pdf(scene, medium, wo, light.direction);
+    const float pdf = PHASE_PDF(p, wo, light.direction);
     const float weight = light.pdf > 0.0f ? mis_weight(light.pdf, pdf) : 1.0f;
     const Spectrum unoccluded = beta * to_spectrum(light.value, (int)path_channel(scene, slot));
     Spectrum value = unoccluded * (pdf * weight);
@@ -109,8 +110,8 @@ INLINE bool scatter(const Scene *scene, uint slot, const Draws *draws, __global 
     const Ray ray = path_ray(scene, slot);
     const uint4 k = drawn_block(scene, draws, BLOCK_DIRECTION);
     float pdf;
-    const float3 wi = phase_sample(scene, medium, ray.d, uniform_below_one(k.x), uniform_below_one(k.y),
-                                   uniform_float(k.w), &pdf);
+    const float3 wi = PHASE_SAMPLE(ray.o, ray.d, uniform_below_one(k.x), uniform_below_one(k.y), uniform_float(k.w),
+                                   &pdf);
     *shadow_ray = next_event(scene, slot, draws, medium, ray.o, ray.d, wi, beta);
     const float weight = spectrum_max(beta) * path_eta_squared(scene, slot);
     const float survival = roulette_survival(scene, bounce, weight, false);

@@ -54,6 +54,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_HAS_TRANSFER": int(f.transfers),
         **{f"CLVOL_PHASE_{name}": int(name in f.phases) for name in layout.ENUMS["PHASE"]},
         "CLVOL_HAS_BLEND": int(f.blend),
+        "CLVOL_HAS_VARIED_PHASE": int(f.varied_phases),
         "CLVOL_HAS_SCATTERING": int(f.scattering),
         "CLVOL_HAS_EMITTERS": int(f.emitters > 0),
         "CLVOL_HAS_NEAR_LIGHTS": int(f.near_lights),

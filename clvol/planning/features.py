@@ -47,6 +47,7 @@ class Features:
     spheres: bool = False
     phases: tuple[str, ...] = ()
     blend: bool = False
+    varied_phases: bool = False
     scattering: bool = False
     emitters: int = 0
     constant: bool = False
@@ -105,9 +106,10 @@ class Features:
     def peaked(self) -> bool:
         """Some phase function has a peak, and some light is found by next-event estimation alone.
 
-        All have to have a convolution in closed form, which tables lack (cl/phase/convolution.h).
+        All have to have a convolution in closed form (cl/phase/convolution.h), which tables lack, and the
+        same everywhere.
         """
-        closed = "HG" in self.phases and "TABPHASE" not in self.phases
+        closed = "HG" in self.phases and "TABPHASE" not in self.phases and not self.varied_phases
         return closed and (self.directional or self.point_lights or self.spot)
 
     @property

@@ -128,6 +128,7 @@ def _medium_features(media: list[records.Medium]) -> dict[str, Any]:
         "only_dark_emitters": bool(varied) and all(map(is_dark_emitter, varied)),
         "phases": tuple(sorted(kind.upper() for kind in phases)),
         "blend": any(len(mixture) > 1 for mixture in lobes),
+        "varied_phases": any(m.phase_weight is not None for m in media),
         "scattering": any(map(scatters, media)),
     }
 

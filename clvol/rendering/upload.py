@@ -103,7 +103,7 @@ def _medium_arrays(prepared: PreparedScene, needed: set[str]) -> dict[str, np.nd
     if "blackbody" in needed:
         arrays["blackbody"] = blackbody_table()
     if "phases" in needed:
-        arrays["phases"] = phase_table(entries)
+        arrays["phases"] = phase_table(entries, prepared.matter)
     return arrays
 
 

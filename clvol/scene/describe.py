@@ -262,8 +262,9 @@ def _medium(medium: records.Medium) -> str:
 
 def _phase(phase: records.PhaseFunction) -> str:
     if isinstance(phase, records.BlendPhase):
-        share = _number(phase.weight)
-        return f"blend ({_phase(phase.first)}, and {share} of it {_phase(phase.second)})"
+        by = phase.weight
+        share = f"by {_volume(by)}" if isinstance(by, records.GridVolume) else f"{_number(by)} of it"
+        return f"blend ({_phase(phase.first)}, and {share} {_phase(phase.second)})"
     if phase.table is not None:
         mean = _number(round(mean_cosine(phase.table), 4))
         return f"{phase.kind} ({len(phase.table.values)} values, mean cosine {mean})"

@@ -19,6 +19,7 @@ LOOKED_UP = {
     "albedo": "",
     "emission": "emits",
     "temperature": "emits",
+    "phase_weight": "",
     "emission_density": "glows",
 }
 """What of a medium may be a grid volume, and the property of the medium without which it does not count."""

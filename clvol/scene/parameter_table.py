@@ -209,7 +209,13 @@ def _phase(medium: Any, phase: records.PhaseFunction, put: Put, path: tuple[str,
         return put(record, replace(now, **changes))
 
     if isinstance(phase, records.BlendPhase):
-        yield "weight", Parameter(medium, phase.weight, values.number(0, 1), lambda m, v: inner(m, weight=v))
+        if isinstance(phase.weight, records.GridVolume):
+            yield from _nested("weight", _volume(phase.weight, 1.0, signed=False))
+        else:
+            yield (
+                "weight",
+                Parameter(medium, phase.weight, values.number(0, 1), lambda m, v: inner(m, weight=v)),
+            )
         for number, side in enumerate(("first", "second")):
 
             def put_side(record: Any, changed: Any, side: str = side) -> Any:

@@ -6,7 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.scene.records import BlendPhase, Phase, PhaseFunction
+from clvol.scene.medium import own_volume, sane
+from clvol.scene.medium_facts import channels_of
+from clvol.scene.records import BlendPhase, ConstVolume, GridVolume, Phase, PhaseFunction
+from clvol.scene.texture import number_share
+from clvol.volumes import check_finite
 
 if TYPE_CHECKING:
     from clvol.scene.reader import Reader
@@ -35,13 +39,7 @@ def blendphase(reader: Reader) -> BlendPhase:
     """The `blendphase` plugin: two phase functions, in the order given, the second of share `weight`."""
     if not reader.has("weight"):
         reader.fail("a blendphase needs a weight", hint="the share of the second phase function, 0 to 1")
-    if not reader.is_value("weight"):
-        reader.fail(
-            "the weight of a blendphase cannot vary in space",
-            "weight",
-            "give a number from 0 to 1",
-        )
-    weight = reader.number("weight", 0.5, minimum=0.0, maximum=1.0)
+    weight = _weight(reader)
     found = reader.children("phase")
     if len(found) != 2:
         where = found[2][0] if len(found) > 2 else ""
@@ -49,7 +47,29 @@ def blendphase(reader: Reader) -> BlendPhase:
     blend = BlendPhase(weight, *(reader.build(node) for _, node in found))
     if _leaves(blend) > MAX_LOBES:
         reader.fail(f"a mixture takes at most {MAX_LOBES} phase functions, got {_leaves(blend)}")
+    if sum(_varied(blend)) > 1:
+        reader.unsupported("a mixture takes one weight that is a volume", "weight")
     return blend
+
+
+def _weight(reader: Reader) -> float | GridVolume:
+    """The `weight`: a number, which is cut to [0, 1] as Mitsuba does, or a volume of one channel."""
+    if reader.is_value("weight"):
+        return number_share(reader, "weight")
+    volume = sane(reader, own_volume(reader, "weight", "a number or a volume of one channel"))
+    if channels_of(volume) > 1:
+        reader.fail("the weight of a blendphase must be a number or a volume of one channel", "weight")
+    if isinstance(volume, ConstVolume):
+        return min(max(volume.value[0], 0.0), 1.0)
+    check_finite(volume.grid, "weight of phase 'blendphase'")
+    return volume
+
+
+def _varied(phase: PhaseFunction) -> list[bool]:
+    """Of each mixture in it, whether its weight is a volume."""
+    if not isinstance(phase, BlendPhase):
+        return []
+    return [isinstance(phase.weight, GridVolume), *_varied(phase.first), *_varied(phase.second)]
 
 
 def _leaves(phase: PhaseFunction) -> int:
@@ -61,16 +81,30 @@ def phase_lobes(phase: PhaseFunction) -> list[tuple[Phase, float]]:
 
     Shares that are 0 as floats are left out; the rest are floats (float32) that add up to 1 within
     rounding.  In this order the rarest lobe is chosen by the smallest random numbers, which resolve best.
+    Where a weight is a volume, they are those for 0.
     """
-    shares: dict[Phase, float] = {}
-    _collect(phase, 1.0, shares)
-    lobes = [(lobe, float(np.float32(share))) for lobe, share in shares.items()]
-    return sorted((pair for pair in lobes if pair[1] > 0), key=lambda pair: pair[1])
+    return [(lobe, share) for lobe, share, _ in varied_lobes(phase)]
 
 
-def _collect(phase: PhaseFunction, share: float, shares: dict[Phase, float]) -> None:
-    if isinstance(phase, BlendPhase):
-        _collect(phase.first, share * (1.0 - phase.weight), shares)
-        _collect(phase.second, share * phase.weight, shares)
+def varied_lobes(phase: PhaseFunction) -> list[tuple[Phase, float, float]]:
+    """The same with how much of the weight that is a volume each share has in addition."""
+    shares: dict[Phase, tuple[float, float]] = {}
+    _collect(phase, (1.0, 0.0), shares)
+    lobes = [(lobe, float(np.float32(a)), float(np.float32(b))) for lobe, (a, b) in shares.items()]
+    return sorted((one for one in lobes if one[1] or one[2]), key=lambda one: one[1] + one[2] / 2)
+
+
+def _collect(
+    phase: PhaseFunction, share: tuple[float, float], shares: dict[Phase, tuple[float, float]]
+) -> None:
+    """Adds up shares a + b w; only one mixture has a weight w that varies."""
+    a, b = share
+    if not isinstance(phase, BlendPhase):
+        before = shares.get(phase, (0.0, 0.0))
+        shares[phase] = before[0] + a, before[1] + b
+    elif isinstance(phase.weight, float | int):
+        _collect(phase.first, (a * (1.0 - phase.weight), b * (1.0 - phase.weight)), shares)
+        _collect(phase.second, (a * phase.weight, b * phase.weight), shares)
     else:
-        shares[phase] = shares.get(phase, 0.0) + share
+        _collect(phase.first, (a, -a), shares)
+        _collect(phase.second, (0.0, a), shares)

@@ -170,14 +170,22 @@ class Phase:
 
 @dataclass(frozen=True)
 class BlendPhase:
-    """Mixture of two phase functions; `weight` in [0, 1] is the share of the second."""
+    """Mixture of two phase functions; `weight` in [0, 1], or a volume cut to that, is the second's share."""
 
-    weight: float
+    weight: float | GridVolume
     first: PhaseFunction
     second: PhaseFunction
 
 
 PhaseFunction = Phase | BlendPhase
+
+
+def _varied_weight(phase: PhaseFunction) -> GridVolume | None:
+    if not isinstance(phase, BlendPhase):
+        return None
+    if isinstance(phase.weight, GridVolume):
+        return phase.weight
+    return _varied_weight(phase.first) or _varied_weight(phase.second)
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,6 +222,11 @@ class Medium:
     def __post_init__(self) -> None:
         for name in ("scale", "emission_scale", "emission_density_scale"):
             object.__setattr__(self, name, as_spectrum(getattr(self, name)))
+
+    @property
+    def phase_weight(self) -> GridVolume | None:
+        """The volume by which its phase functions are mixed, where one is."""
+        return _varied_weight(self.phase)
 
     @property
     def emits(self) -> bool:

@@ -87,10 +87,15 @@ def share(reader: Reader, name: str) -> Texture:
     """A share that must be given: a number, which is cut to [0, 1] as Mitsuba does, a colour or a texture."""
     if not isinstance(reader.node.get(name), Real):
         return texture(reader, name, 0.5)
+    return (number_share(reader, name),)
+
+
+def number_share(reader: Reader, name: str) -> float:
+    """A share that is a number, which is cut to [0, 1] as Mitsuba does."""
     given = reader.number(name, 0.5)
     if not 0 <= given <= 1:
         reader.approximated("the nearest number from 0 to 1, as in Mitsuba", name)
-    return (min(max(given, 0.0), 1.0),)
+    return min(max(given, 0.0), 1.0)
 
 
 def roughness(reader: Reader, name: str, default: Roughness) -> Roughness:

@@ -31,6 +31,7 @@ def medium_table(prepared: PreparedScene) -> np.ndarray:
     cell_offset = kd_root = links_first = phase_first = 0
     sky, suns = mean_incident_radiance(prepared.scene)
     alone = prepared.surfaces is None
+    varied = any(entry.medium.phase_weight is not None for entry in entries)
     boxes = entry_bounds(prepared.scene, prepared.boundaries)
     thin = thin_media(prepared.scene, prepared.boundaries)
     numbered = zip(table, entries, matter.of_entry, boxes, thin, strict=True)
@@ -46,7 +47,7 @@ def medium_table(prepared: PreparedScene) -> np.ndarray:
         record["homogeneous"] = int(is_homogeneous(medium))
         record["clipped"] = int(is_clipped(medium))
         record["phase_first"], record["phase_count"] = phase_first, len(phase_lobes(medium.phase))
-        phase_first += record["phase_count"]
+        phase_first += record["phase_count"] * (2 if varied else 1)
         record["sample_emitters"] = int(medium.sample_emitters)
         _emission(record, medium, roles)
         depth = most_depth(peak_extinction(medium, volume), box)

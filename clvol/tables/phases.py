@@ -7,32 +7,41 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol import layout
-from clvol.scene.phase import phase_lobes
+from clvol.scene.phase import varied_lobes
 from clvol.scene.tabulated import density_points
 
 if TYPE_CHECKING:
     from clvol.scene.boundaries import MediumEntry
+    from clvol.scene.medium_facts import Matter
     from clvol.scene.records import PhaseTable
 
 
-def phase_table(entries: tuple[MediumEntry, ...]) -> np.ndarray:
+def phase_table(entries: tuple[MediumEntry, ...], matter: Matter) -> np.ndarray:
     """One PHASE record per lobe of each medium, in the order that `phase_first` counts in.
 
-    Tables follow, each once, as records of three floats (cl/phase/tabphase.h).
+    Where some mixture's weight is a volume, each medium's lobes have as many records behind them that say how
+    shares vary (cl/phase/varied.h).  Tables follow, each once, as records of three floats
+    (cl/phase/tabphase.h).
     """
-    lobes = [lobe for e in entries for lobe in phase_lobes(e.medium.phase)]
-    records = np.array([(layout.enum("PHASE", p.kind), p.g, share) for p, share in lobes], layout.PHASE)
-    parts = [records]
+    varied = any(e.medium.phase_weight is not None for e in entries)
+    rows: list[tuple[int, float, float]] = []
+    tables: list[tuple[int, PhaseTable]] = []
+    for entry, number in zip(entries, matter.of_entry, strict=True):
+        lobes = varied_lobes(entry.medium.phase)
+        for lobe, share, _ in lobes:
+            tables += [] if lobe.table is None else [(len(rows), lobe.table)]
+            rows.append((layout.enum("PHASE", lobe.kind), lobe.g, share))
+        volume = matter.roles[number].get("phase_weight", -1)
+        rows += [(volume, slope, 0.0) for _, _, slope in lobes] if varied else []
+    parts = [np.array(rows, layout.PHASE)]
     places: dict[PhaseTable, int] = {}
-    end = len(records)
-    for number, (phase, _) in enumerate(lobes):
-        if phase.table is None:
-            continue
-        if phase.table not in places:
-            places[phase.table] = end
-            parts.append(_points(phase.table))
+    end = len(rows)
+    for row, table in tables:
+        if table not in places:
+            places[table] = end
+            parts.append(_points(table))
             end += len(parts[-1])
-        records["g"].view(np.int32)[number] = places[phase.table] - number
+        parts[0]["g"].view(np.int32)[row] = places[table] - row
     return np.concatenate(parts)
 
 

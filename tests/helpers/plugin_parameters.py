@@ -341,7 +341,7 @@ PARAMETERS = {
     "tabphase": ({"values": "1, 2, 3"}, {"values": "1, 2, 4", "angles": "0, 40, 180"}),
     "blendphase": (
         {"weight": 0.5, "a": {"type": "isotropic"}, "b": {"type": "rayleigh"}},
-        {"weight": 0.2, "a": {"type": "hg"}, "b": {"type": "hg"}},
+        {"weight": VOLUME, "a": {"type": "hg"}, "b": {"type": "hg"}},
     ),
     "uniform": ({}, {"value": 0.5}),
     "rawconstant": ({}, {"value": 0.5}),
