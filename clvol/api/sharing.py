@@ -26,7 +26,6 @@ def check_spread(given: Mapping[str, Any]) -> None:
         raise OptionError(what, hint="start a worker for each, with CLVOL_DEVICE=NUMBER in its environment")
     shared = "a render by several devices" if several else "a render on a cluster"
     without = {
-        "target_error": f"give {option('spp')} or {option('time_limit')} instead",
         "checkpoint": "resume=RESULT goes on from a picture that was saved",
         "profile": "profile a render on one device",
     }

@@ -86,7 +86,7 @@ class DaskWorkers:
         """Whether there are fewer ranges under way than workers."""
         return self._under_way() < self._count()
 
-    def render(self, first: int, count: int, again: bool = False) -> Any:
+    def render(self, first: int, count: int, seed: int) -> Any:
         """Hand out a range."""
         if self._scene is None:
             self._scene = self._asked(self._client.scatter, self.job, broadcast=True, hash=False)
@@ -98,7 +98,9 @@ class DaskWorkers:
                 priority=20,
             )
         key = f"clvol-{first}-{count}-{self._new_name()}"
-        future = self._asked(self._client.submit, on_worker.part_of_range, self._scene, first, count, key=key)
+        future = self._asked(
+            self._client.submit, on_worker.part_of_range, self._scene, first, count, seed, key=key
+        )
         self._given[key] = self._scene
         self._pending.add(future)
         future.add_done_callback(self._ended.put)

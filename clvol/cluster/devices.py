@@ -79,15 +79,15 @@ class DeviceWorkers:
         """Whether a device has nothing to do."""
         return any(lane.running is None for lane in self._lanes)
 
-    def render(self, first: int, count: int, again: bool = False) -> Future[Part]:
+    def render(self, first: int, count: int, seed: int) -> Future[Part]:
         """Hand a range to the fastest device that has nothing to do."""
         lane = next(iter(self._useful(1 << 62)))
         future: Future[Part] = Future()
         lane.running = future
-        lane.thread.submit(self._run, lane, future, first, count)
+        lane.thread.submit(self._run, lane, future, (first, count, seed))
         return future
 
-    def _run(self, lane: _Lane, future: Future[Part], first: int, count: int) -> None:
+    def _run(self, lane: _Lane, future: Future[Part], samples: tuple[int, int, int]) -> None:
         """In the device's thread."""
         try:
             if lane.renderer is None:
@@ -95,7 +95,7 @@ class DeviceWorkers:
                 self._about = self._about or lane.renderer.about()
             started = time.perf_counter()
             part = lane.renderer.part(
-                first, count, lambda: max(self._levels.get(None, 0), self._levels.get(future, 0))
+                *samples, lambda: max(self._levels.get(None, 0), self._levels.get(future, 0))
             )
             lane.seconds += time.perf_counter() - started
             lane.samples += part.samples

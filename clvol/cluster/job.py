@@ -89,15 +89,15 @@ class Renderer:
         lines = tuple(session.plan.describe())
         return About(session.device.description, lines, said, Expected.of(session))
 
-    def part(self, first: int, count: int, urgency: Callable[[], int]) -> Part:
-        """The sums of samples `first` to `first + count`; of fewer where an end is asked for meanwhile.
+    def part(self, first: int, count: int, seed: int, urgency: Callable[[], int]) -> Part:
+        """The sums of `count` samples of a seed from `first` on; of fewer where an end is asked for meanwhile.
 
         Raises `Stopped` where it is asked for before the first is done.
         """
         if urgency() > (not self._begun):  # at least one is, or there might be no picture
             raise Stopped("was to end before it began")
         self._begun, session = True, self._session
-        session.restart(self.job.seed)
+        session.restart(seed)
         try:
             done = session.run(first, count, None, urgency)
         except (KeyboardInterrupt, RenderError):

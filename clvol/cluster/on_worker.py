@@ -55,7 +55,7 @@ def about(job: Job) -> About:
             raise _told_from_here(error) from None
 
 
-def part_of_range(job: Job, first: int, count: int) -> Part:
+def part_of_range(job: Job, first: int, count: int, seed: int) -> Part:
     """The sums of a range, once it is this task's turn."""
     from distributed import get_worker
 
@@ -68,7 +68,7 @@ def part_of_range(job: Job, first: int, count: int) -> Part:
         try:
             if urgency() > 1:
                 raise Stopped("was to end before it began")
-            return _renderer(job).part(first, count, urgency)
+            return _renderer(job).part(first, count, seed, urgency)
         except Error as error:
             raise _told_from_here(error) from None
         finally:

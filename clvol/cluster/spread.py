@@ -43,15 +43,18 @@ class Spread(Generic[Handle]):
 
     Parameters
     ----------
-    first, count : its samples of a pixel.
+    first, count, seed : its samples of a pixel.
+    told : the log has said how workers render it.
 
     Attributes
     ----------
     done, seconds : samples of a pixel that are, and the time since the first worker was ready.
     """
 
-    def __init__(self, workers: Workers[Handle], job: Job, first: int, count: int) -> None:
-        self._workers, self.first, self.count = workers, first, count
+    def __init__(
+        self, workers: Workers[Handle], job: Job, first: int, count: int, seed: int, told: bool = False
+    ) -> None:
+        self._workers, self._seed = workers, seed
         self._ranges = enumerate(sample_ranges(first, count, job.pixels))
         self._left = -(-count // max(1, next(sample_ranges(first, count, job.pixels))[1]))
         self._again: deque[_Range] = deque()
@@ -61,6 +64,7 @@ class Spread(Generic[Handle]):
         self._took: list[float] = []
         self._level, self._stopping_since = 0, 0.0
         self._started: float | None = None
+        self._told = told
         self.done = 0
         self.seconds = 0.0
 
@@ -117,7 +121,7 @@ class Spread(Generic[Handle]):
                 self._left -= 1
             else:
                 return
-            self._under_way[self._workers.render(one.first, one.count)] = one
+            self._under_way[self._workers.render(one.first, one.count, self._seed)] = one
 
     def _help_stragglers(self) -> None:
         """Give what takes long to another worker as well, once there is nothing else: who is first counts."""
@@ -128,7 +132,7 @@ class Spread(Generic[Handle]):
         running = list(self._under_way.values())
         for one in sorted(running, key=lambda one: one.since):
             if one.since < late and running.count(one) == 1:
-                self._under_way[self._workers.render(one.first, one.count, again=True)] = one
+                self._under_way[self._workers.render(one.first, one.count, self._seed)] = one
                 return
 
     def _take(self, handle: Handle) -> None:
@@ -155,6 +159,8 @@ class Spread(Generic[Handle]):
         about = self._workers.about() if self._started is None else None
         if about is not None:
             self._started = time.perf_counter()
+            if self._told:
+                return
             log.info("device: %s", about.device)
             for line in about.plan:
                 log.info("%s", line)

@@ -21,8 +21,8 @@ class Workers(Protocol[Handle]):
     def idle(self) -> bool:
         """Whether some worker has nothing to do, and could do what another has begun."""
 
-    def render(self, first: int, count: int, again: bool = False) -> Handle:
-        """Hand out a range; `again`: another worker has it already."""
+    def render(self, first: int, count: int, seed: int) -> Handle:
+        """Hand out a range of the samples of a seed."""
 
     def add(self, handles: list[Handle]) -> Handle:
         """Add sums, in this order."""

@@ -40,7 +40,7 @@ SURVEY_GROWTH = 4
 """Each survey has at most so many times the samples of the one before, lest it take all of a time limit."""
 _SMOOTHED = 5
 """Edge, in pixels, of the square that a pixel's variance is averaged over: single ones are rough."""
-_SURVEY_SEED = 0x9E3779B97F4A7C15
+SURVEY_SEED = 0x9E3779B97F4A7C15
 """Added to the seed of the picture for the survey's."""
 _HALVINGS = 16
 """Of the interval in which a factor is sought: to 5 digits."""
@@ -167,7 +167,7 @@ class TargetRender:
         self.session, self.target, self.most = session, target, most
         self.wavefront = session.wavefront
         self.picture = self.wavefront.film
-        self.survey = self.wavefront.new_film(seed_words((session.seed + _SURVEY_SEED) % 2**64))
+        self.survey = self.wavefront.new_film(seed_words((session.seed + SURVEY_SEED) % 2**64))
         self.low_discrepancy = bool(session.plan.randomizations)
         self.rounding = powers_of_two if self.low_discrepancy else chunks
         self.expected: float | None = None

@@ -92,14 +92,14 @@ def test_a_time_limit_ends_ranges_early(client):
 def test_a_straggler_is_helped_and_counted_once(client, expected, monkeypatch):
     slow, part = [], job.Renderer.part
 
-    def late(renderer, first, count, urgency):
+    def late(renderer, first, count, seed, urgency):
         if first == 20 and not slow:
             slow.append(first)
             on_worker._turn.release()  # the workers of this test share a process, and take turns in it
             while not urgency():
                 time.sleep(0.01)
             on_worker._turn.acquire()
-        return part(renderer, first, count, urgency)
+        return part(renderer, first, count, seed, urgency)
 
     monkeypatch.setattr(job.Renderer, "part", late)
     monkeypatch.setattr("clvol.cluster.spread._SHORT_SECONDS", 0.05)
@@ -125,7 +125,7 @@ def test_faults_on_workers_are_errors_that_say_where(client, monkeypatch):
 
 
 def test_clients_that_will_not_do_are_refused(client):
-    for name, value in (("target_error", 0.1), ("profile", True), ("checkpoint", "a.npz"), ("device", "all")):
+    for name, value in (("profile", True), ("checkpoint", "a.npz"), ("device", "all")):
         with pytest.raises(clvol.OptionError, match=r"cluster takes|each worker of a cluster"):
             clvol.render(scene(), client=client, spp=1, **{name: value})
     closed = distributed.Client(client.cluster)
@@ -159,3 +159,15 @@ def test_all_workers_may_be_killed_and_with_them_what_they_had_of_the_scene(expe
         for which in ([0, 1], [1], [0, 1]):
             client.wait_for_workers(2)
             kill_while_rendering(client, which, expected)
+
+
+def test_a_target_error_is_met_with_bits_that_a_device_has_too(client):
+    options = {"target_error": 0.02, "seed": 5, "sampler": "independent", "pool": 256}
+    seen = []
+    result = clvol.render(scene(), client=client, progress=seen.append, **options)
+    alone = clvol.render(scene(), device=[0], **options)
+    assert result.image.tobytes() == alone.image.tobytes() and result.samples == alone.samples
+    assert result.noise < 1.1 * 0.02 and result.metadata["target_error"] == 0.02
+    assert [record.what for record in seen[:1]] == ["survey"] and seen[-1].what == "rendering"
+    few = clvol.render(scene(), device=[0], spp=24, **options)
+    assert few.samples[1] == 24

@@ -104,7 +104,6 @@ def test_a_picture_is_ended_early_and_kept():
         ({"device": [0, "0"]}, "is listed twice"),
         ({"device": [0, "no such"]}, "no OpenCL device matches 'no such'"),
         ({"device": [0, None, {}]}, "a device is a number or part of a name"),
-        ({"device": "all", "target_error": 0.1}, "several devices takes no target_error"),
         ({"device": [0], "profile": True}, "several devices takes no profile"),
         ({"device": [0], "checkpoint": "a.npz"}, "several devices takes no checkpoint"),
         ({"device": [0], "resume": "a.npz"}, "cannot go on from a checkpoint"),

@@ -1,9 +1,12 @@
 """Ranges of samples follow from the picture alone, and their sums are added in one order, whoever adds."""
 
+import math
+
 import numpy as np
 import pytest
 
 from clvol.cluster.ranges import LEAST_RANGES, MOST_RANGES, RANGE_PATHS, Tree, range_length, sample_ranges
+from clvol.cluster.survey import Need
 from clvol.picture.estimate import Moments
 from clvol.picture.parts import FAN_IN, Part, added, sum_of
 from clvol.picture.result import Result
@@ -58,3 +61,22 @@ def test_what_is_lost_is_known_by_the_ranges_it_was_of():
     for n in (*range(FAN_IN, 2 * FAN_IN), 2 * FAN_IN + 1):
         tree.put(n, 1)
     assert tree.root() == 2 * FAN_IN + 3
+
+
+def needs(target, most, noise_of_one, low_discrepancy):
+    """What surveys ask for, one after the other, until one is enough."""
+    need, asked = Need.of(target, most, 0, math.nan, low_discrepancy), []
+    while need.survey:
+        asked.append(need.survey)
+        noise = noise_of_one / math.sqrt(need.survey)
+        need = Need.of(target, most, need.survey, noise, low_discrepancy)
+    return need.picture, asked
+
+
+def test_surveys_grow_until_they_have_an_eighth_of_what_the_picture_needs():
+    assert needs(0.01, None, 1.0, False) == (10_000, [16, 64, 256, 1024, 2048])
+    assert needs(0.01, None, 1.0, True) == (16_384, [16, 64, 256, 1024, 2048])
+    assert needs(0.01, 500, 1.0, False) == (500, [16, 64])
+    assert needs(0.01, None, 1e-4, False) == (16, [16])
+    assert needs(0.01, None, math.nan, False) == (16, [16, 64, 256])
+    assert needs(0.01, 8, math.nan, False) == (8, [16])
