@@ -121,8 +121,8 @@ def render(  # type: ignore[misc]  # the options of several views are those of o
         that is given as a list.
     client
         A `distributed.Client`: the workers of a Dask cluster share the samples, with bits that do not depend
-        on how many they are: those that `merge` makes of the same ranges. Not with a `target_error`,
-        checkpoints, a pilot or a profile.
+        on how many they are: those that `merge` makes of the same ranges. With a `target_error`
+        every pixel then gets as many samples. Not with checkpoints, a pilot or a profile.
     progress
         True for a progress bar, in a terminal or a notebook; or a callable that receives
         `clvol.base.progress.Progress` records: how far the render is, its ``image`` so far, its ``noise``.

@@ -90,7 +90,7 @@ class Renderer:
         return About(session.device.description, lines, said, Expected.of(session))
 
     def part(self, first: int, count: int, seed: int, urgency: Callable[[], int]) -> Part:
-        """The sums of `count` samples of a seed from `first` on; of fewer where an end is asked for meanwhile.
+        """The sums of `count` samples of a seed from `first` on; of fewer where an end is asked for.
 
         Raises `Stopped` where it is asked for before the first is done.
         """

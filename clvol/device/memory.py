@@ -66,15 +66,20 @@ class DeviceMemory:
 
         The machine is asked while no buffer is out: later its free memory depends on how far they are filled.
         """
-        if self.taken == 0:
-            free = available_memory() if self.shared else None
-            self.limit = self.total if free is None else int(free * (1 - KEPT_FREE))
+        self.room()
         if self.taken + size > self.limit:
             beside = f" beside {_megabytes(self.taken)} in use" if self.taken else ""
             raise DeviceError(
                 f"{what} needs {_megabytes(size)}{beside}; {self.name} has {_megabytes(self.limit)} in all",
                 hint=hint,
             )
+
+    def room(self) -> int:
+        """Bytes that fit beside the buffers there are."""
+        if self.taken == 0:
+            free = available_memory() if self.shared else None
+            self.limit = self.total if free is None else int(free * (1 - KEPT_FREE))
+        return self.limit - self.taken
 
     def _give_back(self, size: int) -> None:
         self.taken -= size

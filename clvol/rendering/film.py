@@ -14,6 +14,7 @@ import pyopencl as cl
 
 from clvol import layout
 from clvol.picture.estimate import Estimate, Moments, Replicates, Uneven
+from clvol.rendering.sizes import HOST_BYTES, film_sizes
 from clvol.tables.sobol import samples_of_each
 
 if TYPE_CHECKING:
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from clvol.planning.plan import Plan
 
 _READ_PIXELS = 1 << 18
-HOST_BYTES = 250
-"""Bytes a pixel that making a picture of the film takes at most, beside the film itself."""
 
 
 class Film:
@@ -39,14 +38,7 @@ class Film:
         self.path_counts = layout.path_counts(plan.macros)
         self.firsts = layout.first_hit_fields(plan.macros)
         self.peaks = 1 + layout.shows_weight(plan.macros)
-        sizes = {
-            "film": 8 * (plan.randomizations or 2) * plan.channels * pixels,
-            "film_peaks": 4 * self.peaks * pixels,
-        }
-        if self.path_counts:
-            sizes["film_counts"] = 8 * len(self.path_counts) * pixels
-        if self.firsts:
-            sizes["film_firsts"] = 8 * len(self.firsts) * pixels
+        sizes = film_sizes(plan, pixels)
         what, hint = f"a film of {pixels} pixels", "render fewer pixels"
         self.buffers = {name: device.memory.allocate(size, what, hint) for name, size in sizes.items()}
         if device.memory.shared:

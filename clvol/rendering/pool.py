@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from clvol.device.device import Device
     from clvol.planning.plan import Plan
 
+_LEAST_PASSES = 4
+"""In flight together, however many jobs they hold."""
+
 
 @dataclass(frozen=True)
 class Pool:
@@ -35,3 +38,12 @@ class Pool:
         groups = max(1, -(-slots // plan.tuning.group_slots))
         slots = groups * plan.tuning.group_slots
         return cls(slots, pass_jobs=4 * slots, ring_jobs=32 * slots)
+
+    def ring(self, sample_jobs: int) -> tuple[int, int]:
+        """Passes in flight together, and the jobs that they hold at most; `sample_jobs`: of a sample of all.
+
+        Of fewer pixels a pass may hold more jobs than of all, though not more than this.
+        """
+        most_jobs = max(self.pass_jobs, sample_jobs)
+        passes = max(_LEAST_PASSES, self.ring_jobs // most_jobs)
+        return passes, most_jobs * passes

@@ -49,6 +49,10 @@ class Residence:
             known = scene.kept[__name__] = cls(device)
         return known
 
+    def has(self, name: str) -> bool:
+        """Whether something of that name is there, up to date or not: it may be replaced."""
+        return name in self._buffers or name in self._made
+
     def put(self, name: str, array: np.ndarray, what: str = "the scene", hint: str = _HINT) -> cl.Buffer:
         """A buffer with the bytes of an array: the one that is there, if it has them."""
         array = np.ascontiguousarray(array)

@@ -24,6 +24,7 @@ from clvol.rendering.light_cache import light_cache_unit
 from clvol.rendering.pool import Pool
 from clvol.rendering.profiler import Profiler, timed
 from clvol.rendering.residence import Residence, compiled
+from clvol.rendering.sizes import check_volumes, render_bytes
 from clvol.rendering.upload import upload_scene
 from clvol.rendering.wavefront import Wavefront
 from clvol.scene.digest import scene_digest
@@ -125,6 +126,8 @@ class Session:
         groups, pixels = slots.slots // plan.tuning.group_slots, int(np.prod(record["film_size"]))
         residence, programs = Residence.of(prepared.scene, device), len(device.programs)
         uploaded_before = residence.uploaded
+        if plan.features.volumes and not residence.has("bricks"):
+            check_volumes(device.memory, prepared, render_bytes(plan, pixels, slots))
         with timed(profiler, "units"):
             grid = light_cache_record(prepared).tobytes() if plan.light_cache else b""
             key = compiled(plan), groups, pixels, grid

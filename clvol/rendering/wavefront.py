@@ -21,6 +21,7 @@ from clvol.device.launch import launch, scene_arguments, set_arguments
 from clvol.rendering.film import Film
 from clvol.rendering.handled import Handled
 from clvol.rendering.profiler import timed
+from clvol.rendering.sizes import stride, wave_sizes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -32,8 +33,6 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("clvol")
 _NEXT_JOB, _JOB_LIMIT, _NON_FINITE, _DONE = (layout.enum("COUNTER", n) for n in layout.ENUMS["COUNTER"])
-_LEAST_PASSES = 4
-"""In flight together, however many jobs they hold."""
 _MAX_ROUND_JOBS = 1 << 31
 _HARVEST_SECONDS = 2.0
 """Statistics of the slots are collected at least this often: their 32-bit counters must not run over."""
@@ -83,7 +82,7 @@ class Wavefront:
         low, high = (int(word) for word in render["seed"][0])
         self.film = self.new_film((low, high))
         self._harvested = time.perf_counter()
-        self.stride = pool.slots + 16  # off the power of two, or all fields of a slot share a cache set
+        self.stride = stride(pool.slots)
         self.seconds = dict.fromkeys((*plan.stages, "accumulate"), 0.0)
         self.launches = self.waves = 0
         self.handled = Handled(self.groups)
@@ -91,24 +90,12 @@ class Wavefront:
         self._use(kernels)
 
     def _allocate(self, scene_buffers: dict[str, cl.Buffer]) -> None:
-        # of fewer pixels a pass may hold more jobs than of all, though not more than this
-        most_jobs = max(self.pool.pass_jobs, self.sample_jobs)
-        self.ring_passes = max(_LEAST_PASSES, self.pool.ring_jobs // most_jobs)
-        ring_jobs = most_jobs * self.ring_passes
+        self.ring_passes, ring_jobs = self.pool.ring(self.sample_jobs)
         sizes = {
             "render": self.render.nbytes,
-            "state": 4 * len(self.fields) * self.stride,
-            "queues": 4 * len(layout.QUEUES) * self.pool.slots,
-            "queue_lengths": 4 * layout.QUEUE_LENGTHS_STRIDE * self.groups,
             "counters": 4 * (_DONE + self.ring_passes),
-            "results": 4 * self.plan.channels * ring_jobs // self.plan.jobs_per_sample,
+            **wave_sizes(self.plan, self.pixels, self.pool.slots, ring_jobs),
         }
-        if self.film.firsts:
-            sizes["result_firsts"] = 4 * len(self.film.firsts) * ring_jobs
-        if self.plan.pixel_list:
-            sizes["pixel_list"] = 8 * self.pixels
-        if stride := layout.counts_per_path(self.plan.macros):
-            sizes["result_counts"] = 4 * stride * ring_jobs
         self.buffers = {name: self._buffer(size) for name, size in sizes.items()} | scene_buffers
         self.bytes = sum(sizes.values()) + sum(b.size for b in scene_buffers.values())
         state = np.zeros((len(self.fields), self.stride), np.uint32)

@@ -4,6 +4,7 @@ What grows with a volume is its samples, the bricks on the device (9³ samples f
 PoCL, its compiler and Python's packages take some 250 MiB beside.
 """
 
+import re
 import tracemalloc
 
 import numpy as np
@@ -73,6 +74,28 @@ def test_a_dense_volume_is_there_once_on_the_host_and_once_on_the_device(device,
     assert peak < most
     assert BRICKS < device.memory.taken - before < BRICKS + BOUNDS
     assert session.prepared.volumes[0].bricks.brick_count == BRICKS // (4 * BRICK_SAMPLES)
+
+
+def test_a_volume_of_four_times_the_devices_memory_is_refused_with_what_would_fit(device, monkeypatch):
+    """Before anything is allocated; and what is said to fit does."""
+    beside = opened(device, {"data": noise(8)}).wavefront.bytes + 2**16  # the render's, and a cube's
+    memory = device.memory
+    taken = memory.taken
+
+    def limited(room):
+        monkeypatch.setattr(memory, "room", lambda: room - (memory.taken - taken))
+        monkeypatch.setattr(memory, "limit", taken + room)
+
+    limited(beside + BRICKS // 4)
+    with pytest.raises(clvol.DeviceError, match="and all of them must be there") as caught:
+        opened(device, {"data": noise(SIZE)})
+    assert memory.taken == taken
+    said = str(caught.value)
+    need = re.search(r"need ([\d.]+) MiB", said)[1]
+    size = re.search(r"on (\d+) x \1 x \1 points", said)[1]
+    assert float(need) == pytest.approx(BRICKS / 2**20, rel=0.01) and device.description in said
+    assert SIZE // 2 < int(size) < SIZE
+    opened(device, {"data": noise(int(size))})
 
 
 def test_half_a_gibibyte_renders_within_two():

@@ -1,0 +1,114 @@
+"""Bytes that a render takes on its device, worked out before any of them is taken.
+
+All of a scene's bricks stay on the device: a volume that has no room there is refused, with what would have.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from clvol import layout
+from clvol.base.memory import format_bytes
+from clvol.base.types import triple
+from clvol.errors import DeviceError
+from clvol.layout import BRICK_CELLS, BRICK_SAMPLES
+
+if TYPE_CHECKING:
+    from clvol.device.memory import DeviceMemory
+    from clvol.planning.plan import Plan
+    from clvol.rendering.pool import Pool
+    from clvol.tables.prepare import PreparedScene
+
+Size = tuple[int, int, int]
+HOST_BYTES = 250
+"""Bytes a pixel that making a picture of the film takes at most, beside the film itself."""
+_MARGIN = 0.95
+"""Share of the free memory that a volume is said to fit in: tops and bounds grow with it, too."""
+
+
+def film_sizes(plan: Plan, pixels: int) -> dict[str, int]:
+    """Of the film's buffers, by name."""
+    sizes = {
+        "film": 8 * (plan.randomizations or 2) * plan.channels * pixels,
+        "film_peaks": 4 * (1 + layout.shows_weight(plan.macros)) * pixels,
+    }
+    if counts := layout.path_counts(plan.macros):
+        sizes["film_counts"] = 8 * len(counts) * pixels
+    if firsts := layout.first_hit_fields(plan.macros):
+        sizes["film_firsts"] = 8 * len(firsts) * pixels
+    return sizes
+
+
+def wave_sizes(plan: Plan, pixels: int, slots: int, ring_jobs: int) -> dict[str, int]:
+    """Of the state of `slots` paths, of queues, and of what the jobs of a ring of passes leave, by name."""
+    groups = slots // plan.tuning.group_slots
+    sizes = {
+        "state": 4 * len(layout.path_fields(plan.macros)) * stride(slots),
+        "queues": 4 * len(layout.QUEUES) * slots,
+        "queue_lengths": 4 * layout.QUEUE_LENGTHS_STRIDE * groups,
+        "results": 4 * plan.channels * ring_jobs // plan.jobs_per_sample,
+    }
+    if firsts := layout.first_hit_fields(plan.macros):
+        sizes["result_firsts"] = 4 * len(firsts) * ring_jobs
+    if plan.pixel_list:
+        sizes["pixel_list"] = 8 * pixels
+    if counts := layout.counts_per_path(plan.macros):
+        sizes["result_counts"] = 4 * counts * ring_jobs
+    return sizes
+
+
+def stride(slots: int) -> int:
+    """From one field of the paths' state to the next: off the power of two, or all share a cache set."""
+    return slots + 16
+
+
+def render_bytes(plan: Plan, pixels: int, pool: Pool) -> int:
+    """That a render takes beside its scene."""
+    _, ring_jobs = pool.ring(pixels * plan.jobs_per_sample)
+    film, waves = film_sizes(plan, pixels), wave_sizes(plan, pixels, pool.slots, ring_jobs)
+    return sum(film.values()) + sum(waves.values())
+
+
+def check_volumes(memory: DeviceMemory, prepared: PreparedScene, beside: int) -> None:
+    """DeviceError where the bricks of a scene's volumes have no room beside so many other bytes."""
+    plural = "volume" if len(prepared.volumes) == 1 else "volumes"
+    need = sum(volume.bricks.brick_count * volume.bricks.channels for volume in prepared.volumes)
+    need *= BRICK_SAMPLES * 4
+    room = min(memory.largest, max(memory.room() - beside, 0))
+    if need <= room:
+        return
+    sizes = [volume.bricks.size for volume in prepared.volumes]
+    fitting = _fitting(prepared, _MARGIN * room)
+    hint = f"on {_said(fitting)} points they would fit" if fitting else "render fewer pixels"
+    had = _said(sizes)
+    raise DeviceError(
+        f"the bricks of the scene's {plural} ({had}) need {format_bytes(need)}; {memory.name} has "
+        f"{format_bytes(room)} for them beside the render, and all of them must be there",
+        hint=f"{hint}; or use a device with more memory",
+    )
+
+
+def _fitting(prepared: PreparedScene, room: float) -> list[Size]:
+    """Sizes of all volumes, in proportion to those they have, that fit; none where nothing does."""
+    bricks = [volume.bricks for volume in prepared.volumes]
+    filled = [one.brick_count / math.prod(one.shape) for one in bricks]
+    share = 1.0
+    while share > _LEAST_SHARE:
+        share *= _STEP
+        sizes = [triple(max(2, int(n * share)) for n in one.size) for one in bricks]
+        places = [math.prod(-(-(n - 1) // BRICK_CELLS) for n in size) for size in sizes]
+        counts = zip(bricks, filled, places, strict=True)
+        if 4 * BRICK_SAMPLES * sum(one.channels * part * count for one, part, count in counts) <= room:
+            return sizes
+    return []
+
+
+def _said(sizes: list[Size]) -> str:
+    return ", ".join("{} x {} x {}".format(*size) for size in sizes[:_MOST_SAID])
+
+
+_STEP, _LEAST_SHARE = 0.98, 1e-3
+"""By which smaller volumes are tried, and to what share of their edges."""
+_MOST_SAID = 8
+"""Volumes that a message has by their sizes."""
