@@ -25,7 +25,9 @@ from typing import Any
 
 import click
 import numpy as np
+from folders import ROOT
 
+HELPERS = ROOT / "tests" / "helpers"
 SUFFIXES = (".xml", ".pbrt")
 _ROOT = re.compile(rb"<scene\b[^>]*\bversion\s*=\s*[\"']([^\"']*)", re.DOTALL)
 _SENSOR = re.compile(rb"<(sensor|camera|include)\b")
@@ -97,6 +99,7 @@ def read_one(path: Path, render: bool, stand_ins: bool) -> dict[str, Any]:
 def _put_stand_ins() -> list[Path]:
     """Have the reader find a small file where one is missing; those that it was given."""
     import clvol.scene.files as files
+    import clvol.scene.loader  # noqa: F401  # so that all who look for files are there
     from clvol.scene.faults import MissingFileError
 
     folder, found, given = Path(tempfile.mkdtemp()), files.find, []
@@ -110,7 +113,9 @@ def _put_stand_ins() -> list[Path]:
                 raise
             return given[-1]
 
-    files.find = find
+    for module in [m for name, m in sys.modules.items() if name.startswith("clvol.scene.")]:
+        if getattr(module, "find", None) is found:
+            module.find = find  # type: ignore[attr-defined]
     return given
 
 
@@ -127,10 +132,17 @@ def _stand_in(folder: Path, suffix: str) -> Path | None:
         path.write_bytes(_serialized())
     elif suffix == ".vol":
         write_vol(path, np.full((2, 2, 2), 0.5, np.float32), ((0, 0, 0), (1, 1, 1)))
+    elif suffix == ".nvdb":
+        sys.path.append(str(HELPERS))
+        from nvdb_writer import write_nvdb
+        from vdb_writer import GridSpec
+
+        leaf = {(0, 0, 0): (np.full((8, 8, 8), 0.5), np.ones((8, 8, 8), bool))}
+        write_nvdb(path, [GridSpec(name, leaves=leaf) for name in ("density", "temperature")])
     elif suffix in PICTURES:
         import OpenImageIO as oiio  # noqa: N813
 
-        picture = oiio.ImageBuf(oiio.ImageSpec(8, 4, 3, "float"))
+        picture = oiio.ImageBuf(oiio.ImageSpec(8, 8, 3, "float"))
         oiio.ImageBufAlgo.fill(picture, (0.5, 0.5, 0.5))
         picture.write(str(path))
     else:
