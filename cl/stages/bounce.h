@@ -44,11 +44,13 @@ INLINE bool survives_roulette(uint k, float survival, Spectrum *beta)
 
 #if CLVOL_LIGHT_CACHE
 /* Shares of what is typical below which a shadow ray may be left out, from media and from surfaces, whose paths are less
-   noisy; and the least transmittance that it is expected to have, so that what it brings is bounded where the cache is
-   wrong. */
+   noisy; the least transmittance that it is expected to have, so that what it brings is bounded where the cache is
+   wrong; and how rarely it is traced at most, so that a picture in which nothing is typical, as of the far side of a
+   sharp phase function, is not black by chance. */
 #define WORTH_TRACING_IN_MEDIA 0.2f
 #define WORTH_TRACING_AT_SURFACES 0.02f
 #define LEAST_EXPECTED 0.01f
+#define LEAST_TRACED 0x1p-6f
 
 /* Roulette of a shadow ray by what it will bring, as the cache of lights has it: the more it falls short of what is
    typical, the rarer it is traced.  `transmittance`: the cached one.  Its lower bound keeps what a ray brings bounded where
@@ -59,9 +61,10 @@ INLINE bool traces_shadow_ray(const Scene *scene, uint k, float worth, float tra
     const float enough = worth * scene->light_cache->typical;
     if (!(expected < enough))
         return true;
-    if (!(uniform_float(k) * enough < expected))
+    const float traced = max_of(expected / enough, LEAST_TRACED);
+    if (!(uniform_float(k) < traced))
         return false;
-    *value *= enough / expected;
+    *value /= traced;
     return true;
 }
 #endif
