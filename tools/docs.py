@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 
 import bench
 import click
+import hard_cases
 from benchmarks.options import mitsuba_option
 from benchmarks.scene_tables import overview
 from benchmarks.tables import judge
@@ -32,6 +33,7 @@ from recipes import RECIPES
 
 from clvol import load_result
 from clvol.cli.messages import OneLineErrors
+from clvol.device.device import open_device
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -259,6 +261,28 @@ def transitions(output: Path) -> None:
     """The table of architecture.md, between its markers, from the contracts of the stages."""
     before, after = between(output.read_text(encoding="utf-8"), *TRANSITIONS, output.name)
     write(output, f"{before}\n{transitions_part()}\n{after}")
+
+
+@main.command()
+@click.option(
+    "--figures",
+    required=True,
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Keeps what is measured; what it has already is not measured again.",
+)
+@click.option(
+    "--group", "groups", multiple=True, type=click.Choice(list(hard_cases.GROUPS)), help="Only these cases."
+)
+@output_option(DOCS / "hard-cases.md")
+def hard(figures: Path, groups: tuple[str, ...], output: Path) -> int:
+    """The page of hard cases: each in every way, some hours in all.
+
+    The exit status is 1 where a case was wrong in any way.
+    """
+    found = hard_cases.measured(hard_cases.chosen(groups), figures)
+    write(output, hard_cases.page(found, open_device(None).description))
+    return 1 if any(one.wrong for one in found.values()) else 0
 
 
 @main.command()

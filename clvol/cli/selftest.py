@@ -1,4 +1,4 @@
-"""`clvol selftest`: whether every way to render a scene makes the same picture."""
+"""`clvol selftest`: whether every way to render a scene makes the same picture, and hard cases theirs."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ import click
 
 from clvol.cli.messages import exit_by, mention
 from clvol.cli.options import definitions_option, device_option, positive_option, skip_option
+from clvol.errors import OptionError
 
 if TYPE_CHECKING:
+    import numpy as np
     from rich.console import Console
     from rich.progress import TaskID
 
@@ -25,6 +27,7 @@ Examples:
   clvol selftest scenes/cloud.xml
   clvol selftest scenes/smoke.xml --quick
   clvol selftest scenes/room.xml --time 600 --alpha 1e-6
+  clvol selftest --quick
 
 Exits with 0 where all agree, 1 where one disagrees or is faulty, 2 for a mistake, 130 for
 Ctrl-C.
@@ -32,8 +35,8 @@ Ctrl-C.
 
 
 @click.command(epilog=EXAMPLES)
-@click.argument("scene", metavar="SCENE")
-@click.option("--quick", is_flag=True, help="Fewer combinations on a smaller film: about a minute.")
+@click.argument("scene", metavar="[SCENE]", required=False)
+@click.option("--quick", is_flag=True, help="Fewer combinations on a smaller film, or fewer cases.")
 @positive_option(
     "--time",
     "seconds",
@@ -54,7 +57,7 @@ Ctrl-C.
 @definitions_option
 @skip_option
 def selftest(
-    scene: str,
+    scene: str | None,
     quick: bool,
     seconds: float | None,
     alpha: float,
@@ -67,12 +70,20 @@ def selftest(
     Techniques, transmittances, majorants, look-ups and all other unbiased choices that the scene has a use
     for are rendered at a small size, in combinations that leave none out, each against all others: their
     tiles and their means. Says the smallest bias that would have been seen.
+
+    Without a SCENE: hard cases of clvol's own, whose pictures are known, on this device.
     """
     from rich.console import Console
 
     import clvol
     from clvol.base.progress import error_console
 
+    if scene is None:
+        for name, given in (("--time", seconds), ("-D", definitions)):
+            if given:
+                raise OptionError(f"{name} is for a scene", hint="name one, or leave it out")
+        hard_cases(quick, alpha, seed, device)
+        return
     loaded = clvol.load_file(scene, **dict(definitions))
     try:
         with _Steps(error_console()) as steps:
@@ -95,6 +106,33 @@ def selftest(
     if not found.passed:
         sys.exit(1)
     exit_by(bool(found.interrupted_of))
+
+
+def hard_cases(quick: bool, alpha: float, seed: int, device: str | None) -> None:
+    """Render the hard cases, each in one way, and tell what they show; exit status 1 where one is wrong."""
+    from clvol.device.device import open_device
+    from clvol.lab.hard.suite import CASES, quick_part, run
+    from clvol.lab.quiet import quiet_renders
+
+    cases = quick_part() if quick else CASES
+    level, wrong, noisy = alpha / len(cases), 0, 0
+    opened = open_device(device)
+    with quiet_renders():
+        for seen in run(opened, cases, seed=seed):
+            word = seen.word(level)
+            wrong, noisy = wrong + (word == "WRONG"), noisy + (word == "too noisy")
+            mean, error, expected = (_numbers(v) for v in (seen.mean, seen.error, seen.expected))
+            why = "".join(f"; {fault}" for fault in seen.faults)
+            click.echo(f"{word:9}  {seen.case.name}: {mean} ± {error}, expected {expected}{why}")
+    right = len(cases) - wrong - noisy
+    click.echo(f"{right} of {len(cases)} cases are right, {noisy} too noisy to show anything, {wrong} wrong.")
+    if wrong:
+        sys.exit(1)
+
+
+def _numbers(values: np.ndarray) -> str:
+    """One number for each channel, or one where all are the same."""
+    return ", ".join(f"{v:.5g}" for v in dict.fromkeys(values.tolist()))
 
 
 class _Steps:

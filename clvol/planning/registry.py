@@ -181,7 +181,7 @@ SAMPLERS = {
         low_discrepancy=True,
     ),
     "joint": Choice(
-        "one Owen-scrambled Sobol' sequence for each pixel, in four parts: still more even, errors overrated",
+        "one Owen-scrambled Sobol' sequence for each pixel, in four parts: more even, errors often overrated",
         "core/sobol.h",
         low_discrepancy=True,
     ),

@@ -1,0 +1,111 @@
+"""Renders the hard cases in every way, and writes the page of what they show.
+
+A file keeps the figures of each case as soon as they are there, so that hours of them may be had in parts.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING
+
+import click
+
+from clvol.device.device import open_device
+from clvol.lab.hard.case import NOISY, ROUNDING
+from clvol.lab.hard.suite import ALPHA, CASES, GROUPS, every_way, run
+from clvol.lab.hard.summary import Summary
+from clvol.lab.quiet import quiet_renders
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from clvol.lab.hard.case import Case
+
+SEED = 2
+INTRODUCTION = """\
+# Hard cases
+
+Scenes on which renderers give NaN, black pixels, leaks or a wrong number. Each is described once, in
+`clvol/lab/hard/`, with the number that its picture must show. `python tools/docs.py hard` renders it by every
+technique, transmittance and majorant that the scene tells apart, samplers by turns, and holds the mean of
+each picture to that number ({device}).
+
+- **expected**: by closed form, or by float64 quadrature with code that shares nothing with the kernels
+  (`clvol/lab/hard/block.py`, `clvol/lab/hard/scenes.py`).
+- **seen**: mean of all ways that are not too noisy, with its standard error.
+- **right**: ways whose mean is within its error of what is expected. Relative errors below {rounding:g} are
+  those of float32. All ways of a case together would raise a false alarm once in {alarm:,}.
+- **too noisy**: ways whose relative standard error is above {noisy:.0%} with the few samples taken here, so
+  that they show nothing: analog transmittance of what hardly passes, one path for channels that differ a
+  million times.
+- **wrong**: all others, and any with a sample that is not finite, a walk that was given up or a density above
+  a bound that the technique needs.
+
+`clvol selftest` renders these cases in one way each, with `--quick` some of them. So do `pytest -m contract`
+and `pytest`. `pytest tests/hard -m hard_full` renders them in every way.
+"""
+
+
+def measured(cases: Sequence[Case], figures: Path) -> dict[str, Summary]:
+    """Of each case, rendered now unless the file has it already."""
+    found = read(figures) if figures.exists() else {}
+    device = open_device(None)
+    for case in cases:
+        if case.name in found:
+            continue
+        with quiet_renders():
+            found[case.name] = Summary.of(list(run(device, [case], every_way, SEED)), ALPHA)
+        with figures.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(found[case.name].as_dict()) + "\n")
+        click.echo(row(case, found[case.name]))
+    return found
+
+
+def read(figures: Path) -> dict[str, Summary]:
+    """Figures of earlier runs."""
+    lines = map(json.loads, figures.read_text(encoding="utf-8").splitlines())
+    return {
+        line["case"]: Summary(**{k: tuple(v) if isinstance(v, list) else v for k, v in line.items()})
+        for line in lines
+    }
+
+
+def page(found: dict[str, Summary], described: str) -> str:
+    """docs/hard-cases.md."""
+    lines = [INTRODUCTION.format(device=described, rounding=ROUNDING, noisy=NOISY, alarm=round(1 / ALPHA))]
+    for group, cases in GROUPS.items():
+        have = [case for case in cases if case.name in found]
+        if not have:
+            continue
+        lines += [f"\n## {group.capitalize()}\n"]
+        lines += ["| case | expected | seen | right | too noisy | wrong |", "|---|---|---|---|---|---|"]
+        lines += [row(case, found[case.name]) for case in have]
+        sources = dict.fromkeys(case.source for case in have)
+        lines += ["", f"Expected by {'; '.join(sources)}."]
+        notes = dict.fromkeys(case.note for case in have if case.note)
+        lines += ["", *(f"- {note[0].upper()}{note[1:]}." for note in notes)]
+    return "\n".join(lines) + "\n"
+
+
+def row(case: Case, found: Summary) -> str:
+    """A line of the table."""
+    seen = ", ".join(said(m, e) for m, e in zip(found.mean, found.error, strict=True))
+    expected = ", ".join(f"{value:.6g}" for value in found.expected)
+    return (
+        f"| {case.name} | {expected} | {seen} | {found.right} | {found.noisy or '–'} | {found.wrong or '–'} |"
+    )
+
+
+def said(mean: float, error: float) -> str:
+    """A mean to the digits that it has, and its standard error."""
+    if error <= 0 or mean == 0:
+        return f"{mean:.6g}"
+    digits = max(1, math.ceil(math.log10(abs(mean) / error)) + 1)
+    return f"{mean:.{min(digits, 7)}g} ± {error:.1g}"
+
+
+def chosen(groups: Sequence[str]) -> list[Case]:
+    """The cases of these groups, or all."""
+    return [case for case in CASES if not groups or case.group in groups]
