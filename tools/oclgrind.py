@@ -28,6 +28,7 @@ from typing import Any
 import click
 import numpy as np
 from folders import ROOT, SCENES
+from oclgrind_scenes import MADE
 
 import clvol
 from clvol.cli.messages import fail
@@ -43,7 +44,7 @@ POOL = 64
 
 @dataclass(frozen=True)
 class Case:
-    """A scene of scenes/ ("" for the one below), its definitions, and what `clvol.render` is told beside."""
+    """A scene of scenes/ or oclgrind_scenes.py, its definitions, and what `clvol.render` is told beside."""
 
     scene: str
     definitions: dict[str, int]
@@ -72,6 +73,9 @@ CASES = {
         SQUARE,
         {"technique": "delta", "transmittance": "ratio", "majorant": "grid", "lookup": "stochastic"},
     ),
+    "cloud, lanes": Case(
+        "cloud", SQUARE, {"technique": "delta", "transmittance": "ratio", "majorant": "grid", "lanes": "8"}
+    ),
     "cloud, marching": Case(
         "cloud", SQUARE, {"technique": "marching", "transmittance": "marching", "sampler": "sobol"}
     ),
@@ -85,7 +89,26 @@ CASES = {
         {"technique": "spectral-decomposition", "transmittance": "delta", "majorant": "global"},
     ),
     "shaft": Case("shaft", SIDES, uninitialised=False),
-    "everything else": Case("", {}, {"majorant": "grid"}),
+    "lights and masks": Case("lights and masks", {}, {"majorant": "grid"}),
+    "materials": Case("materials", {}),
+    "colours, delta": Case("colours", {}, {"technique": "delta", "majorant": "grid"}),
+    "colours, spectral": Case(
+        "colours", {}, {"technique": "spectral", "majorant": "grid", "probability": "max"}
+    ),
+    "flames": Case("flames", {}, {"majorant": "grid", "probability": "average"}),
+    "within": Case("within", {}),
+    "far apart": Case("far apart", {}, {"technique": "delta", "majorant": "grid"}),
+    "far apart, tree": Case("far apart", {}, {"technique": "spectral", "majorant": "kdtree"}),
+    "a backdrop": Case("a backdrop", {}, {"technique": "delta", "background": "sampled", "majorant": "grid"}),
+    "a background": Case(
+        "transparent", {}, {"technique": "delta", "background": "expected", "majorant": "grid"}
+    ),
+    "transparent": Case("transparent", {}, {"background": "transparent", "majorant": "grid"}),
+    "strata": Case(
+        "an emitting medium",
+        {},
+        {"technique": "regular", "transmittance": "regular", "gathering": "strata", "majorant": "grid"},
+    ),
     "fire": Case("fire", SIDES, {"technique": "weighted-delta", "sampler": "independent", "aov": AOVS}),
 }
 
@@ -110,72 +133,6 @@ class Finding:
         atomics = sum("atomic_" in line for line in lines)
         of_one_number = any(all(name in line for line in lines) for name in HARMLESS)
         return "race" in self.what and len(lines) == 2 and atomics == 1 and of_one_number
-
-
-def everything_else() -> clvol.Scene:
-    """What scenes/ have not: pictures as textures and environment, a lens, masks, spots, mixed phases."""
-    random = np.random.default_rng(1)
-    picture = random.random((4, 6, 3)).astype(np.float32)
-    cells = random.random((5, 4, 3)).astype(np.float32)
-    smoke = {
-        "type": "heterogeneous",
-        "sigma_t": {"type": "gridvolume", "grid": cells, "to_world": clvol.translate((-0.5, 0, -0.5))},
-        "albedo": 0.8,
-        "scale": 6.0,
-        "phase": {
-            "type": "blendphase",
-            "weight": 0.3,
-            "a": {"type": "rayleigh"},
-            "b": {"type": "hg", "g": 0.5},
-        },
-    }
-    texture = {"type": "bitmap", "bitmap": picture}
-    return clvol.load_dict(
-        {
-            "type": "scene",
-            "integrator": {"type": "volpath", "max_depth": 12},
-            "sensor": {
-                "type": "thinlens",
-                "fov": 45.0,
-                "aperture_radius": 0.02,
-                "focus_distance": 2.0,
-                "to_world": clvol.look_at((0.3, 1.0, -2.0), (0, 0.4, 0), (0, 1, 0)),
-                "film": {"type": "hdrfilm", "width": 4, "height": 4, "rfilter": {"type": "mitchell"}},
-            },
-            "sky": {"type": "envmap", "bitmap": picture},
-            "spot": {"type": "spot", "to_world": clvol.look_at((1, 2, 0), (0, 0, 0), (0, 0, 1))},
-            "point": {"type": "point", "position": (0.0, 1.5, -1.0)},
-            "lamp": {
-                "type": "sphere",
-                "center": (-0.9, 1.0, 0.0),
-                "radius": 0.1,
-                "light": {"type": "area", "radiance": 3.0},
-            },
-            "floor": {
-                "type": "rectangle",
-                "to_world": clvol.rotate((1, 0, 0), -90.0) @ clvol.scale(2.0),
-                "bsdf": {"type": "twosided", "nested": {"type": "diffuse", "reflectance": texture}},
-            },
-            "veil": {
-                "type": "rectangle",
-                "to_world": clvol.translate((0, 0.5, -0.8)) @ clvol.scale(0.5),
-                "bsdf": {"type": "mask", "opacity": texture, "nested": {"type": "roughplastic"}},
-            },
-            "pearl": {
-                "type": "sphere",
-                "center": (0.7, 0.3, 0.2),
-                "radius": 0.3,
-                "bsdf": {"type": "dielectric"},
-                "interior": {"type": "homogeneous", "sigma_t": 2.0, "albedo": 0.5},
-            },
-            "smoke": {
-                "type": "cube",
-                "to_world": clvol.translate((0, 0.5, 0)) @ clvol.scale(0.5),
-                "bsdf": {"type": "null"},
-                "interior": smoke,
-            },
-        }
-    )
 
 
 def line_of(place: str) -> str:
@@ -219,12 +176,17 @@ def write_whole_buffers() -> None:
     cl.enqueue_copy, cl.enqueue_fill_buffer = copy, fill
 
 
+def scene_of(case: Case) -> clvol.Scene:
+    """The scene that a case names."""
+    if case.scene in MADE:
+        return MADE[case.scene]()
+    return clvol.load_file(SCENES / f"{case.scene}.xml", **case.definitions)
+
+
 def render(case: Case) -> None:
     """Render a case, in a process that Oclgrind began."""
     write_whole_buffers()
-    path = SCENES / f"{case.scene}.xml"
-    scene = clvol.load_file(path, **case.definitions) if case.scene else everything_else()
-    result = clvol.render(scene, spp=1, seed=1, pool=POOL, **case.options)
+    result = clvol.render(scene_of(case), spp=1, seed=1, pool=POOL, **case.options)
     if not (result.image > 0).any():
         raise clvol.Error("the picture is black")
 

@@ -1,0 +1,209 @@
+"""Tiny scenes of what scenes/ have not, for tools/oclgrind.py: for each part of cl/ one compiles it."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from folders import ROOT
+
+import clvol
+
+sys.path.insert(0, str(ROOT / "tests" / "helpers"))
+
+from vdb_writer import GridSpec, write_vdb
+
+SMALL = {"type": "hdrfilm", "width": 4, "height": 4, "rfilter": {"type": "box"}}
+RANDOM = np.random.default_rng(1)
+PICTURE, CELLS = RANDOM.random((4, 6, 3)).astype(np.float32), RANDOM.random((5, 4, 3)).astype(np.float32)
+COLOURS = RANDOM.random((5, 4, 3, 3)).astype(np.float32)
+TEXTURE = {"type": "bitmap", "bitmap": PICTURE}
+
+
+def lights_and_masks() -> clvol.Scene:
+    """Pictures as textures and environment, a lens, masks, spots, mixed phases."""
+    smoke = {
+        "type": "heterogeneous",
+        "sigma_t": {"type": "gridvolume", "grid": CELLS, "to_world": clvol.translate((-0.5, 0, -0.5))},
+        "albedo": 0.8,
+        "scale": 6.0,
+        "phase": {
+            "type": "blendphase",
+            "weight": 0.3,
+            "a": {"type": "rayleigh"},
+            "b": {"type": "hg", "g": 0.5},
+        },
+    }
+    return clvol.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "volpath", "max_depth": 12},
+            "sensor": {
+                "type": "thinlens",
+                "fov": 45.0,
+                "aperture_radius": 0.02,
+                "focus_distance": 2.0,
+                "to_world": clvol.look_at((0.3, 1.0, -2.0), (0, 0.4, 0), (0, 1, 0)),
+                "film": {"type": "hdrfilm", "width": 4, "height": 4, "rfilter": {"type": "mitchell"}},
+            },
+            "sky": {"type": "envmap", "bitmap": PICTURE},
+            "spot": {"type": "spot", "to_world": clvol.look_at((1, 2, 0), (0, 0, 0), (0, 0, 1))},
+            "point": {"type": "point", "position": (0.0, 1.5, -1.0)},
+            "lamp": {
+                "type": "sphere",
+                "center": (-0.9, 1.0, 0.0),
+                "radius": 0.1,
+                "light": {"type": "area", "radiance": 3.0},
+            },
+            "floor": {
+                "type": "rectangle",
+                "to_world": clvol.rotate((1, 0, 0), -90.0) @ clvol.scale(2.0),
+                "bsdf": {"type": "twosided", "nested": {"type": "diffuse", "reflectance": TEXTURE}},
+            },
+            "veil": {
+                "type": "rectangle",
+                "to_world": clvol.translate((0, 0.5, -0.8)) @ clvol.scale(0.5),
+                "bsdf": {"type": "mask", "opacity": TEXTURE, "nested": {"type": "roughplastic"}},
+            },
+            "pearl": {
+                "type": "sphere",
+                "center": (0.7, 0.3, 0.2),
+                "radius": 0.3,
+                "bsdf": {"type": "dielectric"},
+                "interior": {"type": "homogeneous", "sigma_t": 2.0, "albedo": 0.5},
+            },
+            "smoke": {
+                "type": "cube",
+                "to_world": clvol.translate((0, 0.5, 0)) @ clvol.scale(0.5),
+                "bsdf": {"type": "null"},
+                "interior": smoke,
+            },
+        }
+    )
+
+
+def field(values: np.ndarray) -> dict[str, Any]:
+    """A volume in the box from -0.5 to 0.5."""
+    return {"type": "gridvolume", "grid": values, "to_world": clvol.translate((-0.5, -0.5, -0.5))}
+
+
+def pinhole(at: tuple[float, float, float] = (0, 0, -3), **film: Any) -> dict[str, Any]:
+    """A camera that looks at the origin."""
+    to_world = clvol.look_at(at, (0, 0, 0), (0, 1, 0))
+    return {"type": "perspective", "fov": 40.0, "to_world": to_world, "film": SMALL | film}
+
+
+def box(medium: dict[str, Any], **more: Any) -> dict[str, Any]:
+    """A medium in that box."""
+    half = clvol.scale(0.5)
+    return {"type": "cube", "to_world": half, "bsdf": {"type": "null"}, "interior": medium} | more
+
+
+def materials() -> clvol.Scene:
+    """A wall of balls, one of each BSDF that scenes/ and the scene above have not."""
+    diffuse = {"type": "diffuse", "reflectance": TEXTURE}
+    bsdfs = [
+        {"type": "conductor", "material": "Au"},
+        {"type": "thindielectric"},
+        {"type": "principled", "base_color": TEXTURE, "roughness": 0.4, "clearcoat": 0.5, "metallic": 0.3},
+        {"type": "principled", "base_color": 0.5, "roughness": 0.3, "spec_trans": 0.8, "eta": 1.4},
+        {"type": "principledthin", "roughness": 0.4, "spec_trans": 0.5, "diff_trans": 0.6},
+        {"type": "roughconductor", "alpha": TEXTURE},
+        {"type": "roughdielectric", "alpha": 0.3},
+        {"type": "blendbsdf", "weight": 0.4, "a": diffuse, "b": {"type": "roughplastic"}},
+    ]
+    balls = {
+        f"ball{n}": {
+            "type": "sphere",
+            "center": (n % 4 - 1.5, n // 4 - 0.5, 0.0),
+            "radius": 0.55,
+            "bsdf": {"type": "twosided", "nested": bsdf} if bsdf["type"] == "roughconductor" else bsdf,
+        }
+        for n, bsdf in enumerate(bsdfs)
+    }
+    sky = {"type": "envmap", "bitmap": PICTURE}
+    integrator = {"type": "path", "max_depth": 6}
+    return clvol.load_dict(
+        {"type": "scene", "integrator": integrator, "sensor": pinhole(), "sky": sky, **balls}
+    )
+
+
+def colours() -> clvol.Scene:
+    """A camera inside a medium of coloured volumes, of a tabulated phase function, which glows."""
+    fog = {
+        "type": "heterogeneous",
+        "sigma_t": field(COLOURS),
+        "albedo": field(COLOURS),
+        "emission_density": field(COLOURS),
+        "scale": 4.0,
+        "phase": {"type": "tabphase", "values": "0.2, 0.5, 1, 3"},
+    }
+    sensor = pinhole((0.1, 0.2, -0.3)) | {"medium": {"type": "ref", "id": "fog"}}
+    described = {"type": "scene", "sensor": sensor, "fog": fog | {"id": "fog"}, "sky": {"type": "constant"}}
+    return clvol.load_dict(described | {"box": box({"type": "ref", "id": "fog"})})
+
+
+def flames() -> clvol.Scene:
+    """Emission of two media that overlap, one of them classified, seen in parallel under a sun."""
+    fire = {"type": "heterogeneous", "sigma_t": field(CELLS), "emission": field(CELLS), "scale": 3.0}
+    values = {"type": "classified", "values": field(CELLS), "opacity": "0: 0, 1: 4", "albedo": 0.7}
+    sensor = {"type": "orthographic", "to_world": clvol.look_at((0, 0, -3), (0, 0, 0), (0, 1, 0))}
+    return clvol.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "volpath", "max_depth": 8},
+            "sensor": sensor | {"film": SMALL | {"pixel_format": "rgba"}},
+            "sky": {"type": "sunsky", "sun_direction": (0.3, -0.5, 0.8)},
+            "fire": box(fire),
+            "values": box(values, to_world=clvol.translate((0.2, 0.1, 0)) @ clvol.scale(0.5)),
+        }
+    )
+
+
+def one_medium(**more: Any) -> clvol.Scene:
+    """One heterogeneous medium under a uniform sky, with more of the film or of the medium."""
+    fog = {"type": "heterogeneous", "sigma_t": field(CELLS), "albedo": 0.8, "scale": 6.0}
+    fog |= {name: value for name, value in more.items() if name == "emission"}
+    film = {name: value for name, value in more.items() if name != "emission"}
+    return clvol.load_dict(
+        {"type": "scene", "sensor": pinhole(**film), "sky": {"type": "constant"}, "fog": box(fog)}
+    )
+
+
+def within() -> clvol.Scene:
+    """A camera in a ball of glass that is filled with fog."""
+    fog = {"type": "homogeneous", "sigma_t": 0.5, "albedo": 0.8}
+    ball = {"type": "sphere", "radius": 5.0, "bsdf": {"type": "dielectric"}, "interior": fog}
+    integrator = {"type": "volpath", "max_depth": 8}
+    described = {"type": "scene", "integrator": integrator, "sensor": pinhole(), "sky": {"type": "constant"}}
+    return clvol.load_dict(described | {"ball": ball})
+
+
+def far_apart() -> clvol.Scene:
+    """A sparse grid of which two distant corners hold something."""
+    leaf = np.full((8, 8, 8), 0.2), np.ones((8, 8, 8), bool)
+    with tempfile.NamedTemporaryFile(suffix=".vdb") as file:
+        write_vdb(Path(file.name), [GridSpec(leaves={(0, 0, 0): leaf, (600, 600, 600): leaf})])
+        grid = clvol.load_volume(file.name)
+    fog = {"type": "heterogeneous", "sigma_t": {"type": "gridvolume", "grid": grid}, "albedo": 0.8}
+    cube = {"type": "cube", "to_world": clvol.translate((304, 304, 304)) @ clvol.scale(304.0)}
+    camera = {"to_world": clvol.look_at((-20, -20, -20), (4, 4, 4), (0, 1, 0))}
+    described = {"type": "scene", "sensor": pinhole() | camera, "sky": {"type": "constant"}}
+    return clvol.load_dict(described | {"cube": cube | {"bsdf": {"type": "null"}, "interior": fog}})
+
+
+MADE = {
+    "lights and masks": lights_and_masks,
+    "materials": materials,
+    "colours": colours,
+    "flames": flames,
+    "within": within,
+    "far apart": far_apart,
+    "a backdrop": lambda: one_medium(backdrop=0.3),
+    "transparent": lambda: one_medium(pixel_format="rgba"),
+    "an emitting medium": lambda: one_medium(emission=2.0),
+}
+"""Scenes by name."""
