@@ -114,12 +114,14 @@ def materials() -> clvol.Scene:
         {"type": "roughconductor", "alpha": TEXTURE},
         {"type": "roughdielectric", "alpha": 0.3},
         {"type": "blendbsdf", "weight": 0.4, "a": diffuse, "b": {"type": "roughplastic"}},
+        {"type": "bumpmap", "heights": TEXTURE, "nested": diffuse},
+        {"type": "normalmap", "normalmap": TEXTURE, "nested": {"type": "roughplastic"}},
     ]
     balls = {
         f"ball{n}": {
             "type": "sphere",
-            "center": (n % 4 - 1.5, n // 4 - 0.5, 0.0),
-            "radius": 0.55,
+            "center": (0.55 * (n % 4) - 0.825, 0.6 * (n // 4) - 0.6, 0.0),
+            "radius": 0.33,
             "bsdf": {"type": "twosided", "nested": bsdf} if bsdf["type"] == "roughconductor" else bsdf,
         }
         for n, bsdf in enumerate(bsdfs)
@@ -133,13 +135,14 @@ def materials() -> clvol.Scene:
 
 def colours() -> clvol.Scene:
     """A camera inside a medium of coloured volumes, of a tabulated phase function, which glows."""
+    table = {"type": "tabphase", "values": "0.2, 0.5, 1, 3"}
     fog = {
         "type": "heterogeneous",
         "sigma_t": field(COLOURS),
         "albedo": field(COLOURS),
         "emission_density": field(COLOURS),
         "scale": 4.0,
-        "phase": {"type": "tabphase", "values": "0.2, 0.5, 1, 3"},
+        "phase": {"type": "blendphase", "weight": field(CELLS), "a": table, "b": {"type": "hg", "g": 0.3}},
     }
     sensor = pinhole((0.1, 0.2, -0.3)) | {"medium": {"type": "ref", "id": "fog"}}
     described = {"type": "scene", "sensor": sensor, "fog": fog | {"id": "fog"}, "sky": {"type": "constant"}}
@@ -154,8 +157,8 @@ def flames() -> clvol.Scene:
     return clvol.load_dict(
         {
             "type": "scene",
-            "integrator": {"type": "volpath", "max_depth": 8},
-            "sensor": sensor | {"film": SMALL | {"pixel_format": "rgba"}},
+            "integrator": {"type": "volpath", "max_depth": 3},
+            "sensor": sensor | {"film": SMALL | {"width": 2, "height": 2, "pixel_format": "rgba"}},
             "sky": {"type": "sunsky", "sun_direction": (0.3, -0.5, 0.8)},
             "fire": box(fire),
             "values": box(values, to_world=clvol.translate((0.2, 0.1, 0)) @ clvol.scale(0.5)),

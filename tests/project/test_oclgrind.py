@@ -90,6 +90,7 @@ FIXED = {"CLVOL_LOCAL_SIZE", "CLVOL_LANES"}
 """Macros that the device decides, and units."""
 
 
+@pytest.mark.contract
 def test_every_part_of_the_kernels_is_compiled_for_some_case(oclgrind: ModuleType) -> None:
     """And left out for another: a macro that hides something has several values."""
     values: dict[str, set[int]] = {}
