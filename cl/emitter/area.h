@@ -1,4 +1,4 @@
-/* Area lights: shapes whose front sends the same radiance from every point into every direction.
+/* Area lights: shapes whose front sends the same radiance into every direction, from every point or by a texture.
 
    Points are drawn uniformly over the area, but for spheres seen from outside: there, directions are drawn
    uniformly within the cone that the sphere subtends (Shirley, Wang, Zimmerman 1996).  Densities are per solid
@@ -13,6 +13,9 @@
 #include "emitter/choice.h"
 #include "emitter/light_sample.h"
 #include "geometry/surface.h"
+#if CLVOL_HAS_AREA_TEXTURE
+#include "texture/texture.h"
+#endif
 
 /* A sphere as seen from a point outside. */
 typedef struct {
@@ -128,6 +131,34 @@ INLINE void sample_area(const Scene *scene, __global const Emitter *emitter, flo
     }
 }
 
+#if CLVOL_HAS_AREA_TEXTURE
+/* Radiance of the light at its point (u, v). */
+INLINE float3 textured_radiance(const Scene *scene, __global const Emitter *emitter, float2 uv)
+{
+    const int number = (int)emitter->beam_width - 1;
+    return number >= 0 ? texture_value(scene, number, uv) : emitter_value(emitter);
+}
+
+/* Gives a sample of the light the radiance of its own point, where it has that of the mean; u and v: as they were
+   sampled with. */
+INLINE void show_texture(const Scene *scene, __global const Emitter *emitter, float3 from, float u, float v,
+                         LightSample *light)
+{
+    if (light->pdf == 0.0f || emitter->beam_width == 0.0f)
+        return;
+    const float root = sqrt_of(u);
+    Ray ray;
+    ray.o = from;
+    ray.d = light->direction;
+    Hit hit;
+    hit.t = light->distance;
+    hit.primitive = light->primitive;
+    hit.u = root * (1.0f - v);
+    hit.v = root * v;
+    light->value = textured_radiance(scene, emitter, hit_surface(scene, ray, &hit).uv) / light->pdf;
+}
+#endif
+
 /* The area light that a ray in direction d sees at the surface, or NULL: no light, or its back. */
 INLINE __global const Emitter *seen_light(const Scene *scene, const Surface *surface, float3 d)
 {
@@ -139,6 +170,9 @@ INLINE __global const Emitter *seen_light(const Scene *scene, const Surface *sur
 INLINE float3 area_radiance(const Scene *scene, const Surface *surface, float3 d)
 {
     __global const Emitter *emitter = seen_light(scene, surface, d);
+#if CLVOL_HAS_AREA_TEXTURE
+    return emitter ? textured_radiance(scene, emitter, surface->uv) : (float3)(0.0f);
+#endif
     return emitter ? emitter_value(emitter) : (float3)(0.0f);
 }
 

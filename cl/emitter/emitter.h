@@ -38,6 +38,9 @@ INLINE LightSample sample_light(const Scene *scene, float3 from, float pick, flo
 #if CLVOL_HAS_AREA
     if (emitter->kind == EMITTER_AREA) {
         sample_area(scene, emitter, from, pick, u, v, &light);
+#if CLVOL_HAS_AREA_TEXTURE
+        show_texture(scene, emitter, from, u, v, &light);
+#endif
         return light;
     }
 #endif

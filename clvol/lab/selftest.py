@@ -37,10 +37,12 @@ from clvol.lab.trials import Trial, rounds
 from clvol.lab.verdict import SelfTest
 from clvol.planning.choices import Choices
 from clvol.rendering.session import MAX_SAMPLES
+from clvol.scene.materials import Bitmap, Checkerboard
 from clvol.scene.records import Scene
 
 if TYPE_CHECKING:
     from clvol.picture.result import Result
+    from clvol.scene.materials import Texture
 
 LEAST_ROUNDS, MOST_ROUNDS = 4, 32
 ENOUGH_ROUNDS = 2
@@ -153,7 +155,7 @@ def selftest(
 
 def brightest_light(scene: Scene) -> float:
     """Largest radiance, in any channel, of the lights that a path can find by chance."""
-    surfaces = [shape.emission for shape in scene.shapes if shape.emission is not None]
+    surfaces = [_brightest(shape.emission) for shape in scene.shapes if shape.emission is not None]
     around = [light.radiance for light in scene.emitters if hasattr(light, "radiance")]
     return max((float(np.max(radiance)) for radiance in (*surfaces, *around)), default=0.0)
 
@@ -208,3 +210,12 @@ def _rendered(trials: list[Trial], spp: int, count: int, seeds: Iterator[int], t
         }
         one.largest_weight = max(r.stats["largest_weight"] for r in own)
     return tested
+
+
+def _brightest(emission: Texture) -> float:
+    """Largest component of a colour or texture."""
+    if isinstance(emission, Bitmap):
+        return float(emission.pixels.max())
+    if isinstance(emission, Checkerboard):
+        return max(*emission.color0, *emission.color1)
+    return max(emission)

@@ -88,7 +88,7 @@ EMITTER = _record(
     ("vector", "f", 3),  # direction of travel, a spot's axis, or the mean normal of an area light
     ("position", "f", 3),  # of a point or spot, or the middle of an area light; up where a horizon cuts a sun
     ("cutoff_angle", "f", 1),  # of a spot, radians
-    ("beam_width", "f", 1),  # of a spot, radians
+    ("beam_width", "f", 1),  # of a spot, radians; of an area light with a texture: 1 + its number
     ("shape", "i", 1),  # of an area light
     ("area", "f", 1),  # or the solid angle of a sun
     ("first", "i", 1),  # of a mesh's entries in `light_faces` and `light_cdf`

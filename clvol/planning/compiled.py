@@ -68,6 +68,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_HAS_AREA_MESH": int(f.area_meshes),
         "CLVOL_HAS_AREA_SPHERE": int(f.area_spheres),
         "CLVOL_HAS_AREA_DISK": int(f.area_disks),
+        "CLVOL_HAS_AREA_TEXTURE": int(f.area_textures),
         "CLVOL_HAS_SURFACES": int(f.surfaces > 0),
         "CLVOL_HAS_TRIANGLES": int(f.triangles),
         "CLVOL_HAS_QUADRICS": int(f.quadrics),

@@ -60,6 +60,7 @@ class Features:
     area_spheres: bool = False
     area_disks: bool = False
     area_cylinders: bool = False
+    area_textures: bool = False
     samples_lights: bool = False
     surfaces: int = 0
     triangles: bool = False

@@ -11,16 +11,19 @@ from clvol.scene.boundaries import Boundaries, camera_may_be_inside, is_clipped,
 from clvol.scene.material_facts import (
     bsdf_kinds,
     bsdf_textures,
+    color_is_grey,
     has_bitmaps,
     has_bumps,
     has_rough_textures,
     has_tables,
+    is_textured,
     is_transmissive,
     passes_light,
     reflects,
     samples_lights,
 )
 from clvol.scene.material_facts import is_grey as bsdf_is_grey
+from clvol.scene.materials import Bitmap
 from clvol.scene.medium_facts import (
     bounding_kind,
     channels_of,
@@ -147,7 +150,8 @@ def _surface_features(surfaces: list[records.Shape]) -> dict[str, Any]:
     """What rays meet beside media."""
     meshes = [mesh_of(s) for s in surfaces if s.kind not in QUADRICS]
     bsdfs = [s.bsdf for s in surfaces]
-    textures = any(bsdf_textures(b) for b in bsdfs)
+    pictures = [s.emission for s in surfaces if is_textured(s.emission)]
+    textures = bool(pictures) or any(bsdf_textures(b) for b in bsdfs)
     return {
         "surfaces": len(surfaces),
         "triangles": bool(meshes),
@@ -157,7 +161,8 @@ def _surface_features(surfaces: list[records.Shape]) -> dict[str, Any]:
         "bsdfs": tuple(sorted(set().union(*(bsdf_kinds(b) for b in bsdfs)))),
         "chromatic_surfaces": not all(map(bsdf_is_grey, bsdfs)),
         "textures": textures,
-        "bitmaps": any(map(has_bitmaps, bsdfs)),
+        "bitmaps": any(map(has_bitmaps, bsdfs)) or any(isinstance(p, Bitmap) for p in pictures),
+        "area_textures": bool(pictures),
         "material_tables": any(map(has_tables, bsdfs)),
         "rough_textures": any(map(has_rough_textures, bsdfs)),
         "bumps": any(map(has_bumps, bsdfs)),
@@ -175,7 +180,9 @@ def _light_features(
 ) -> dict[str, Any]:
     """Where light comes from; `lamps`: the surfaces that shine."""
     kinds = {*map(_emitter_kind, scene.emitters), *map(_lamp_kind, lamps)}
-    grey = all(map(_emitter_is_grey, scene.emitters)) and all(len(set(s.emission or ())) == 1 for s in lamps)
+    grey = all(map(_emitter_is_grey, scene.emitters)) and all(
+        color_is_grey(s.emission) for s in lamps if s.emission
+    )
     sampled = any(m.sample_emitters for m in media) or bool(surfaces)
     return {
         "emitters": len(scene.emitters) + len(lamps),

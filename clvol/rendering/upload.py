@@ -128,7 +128,9 @@ def _bounds(majorant: PreparedMajorant) -> np.ndarray:
 
 def _surface_arrays(surfaces: Surfaces, lights: LightTable) -> dict[str, np.ndarray]:
     """What the device knows of surfaces, by argument name; without what no surface has."""
-    materials = material_table([shape.bsdf for shape in surfaces.shapes])
+    materials = material_table(
+        [shape.bsdf for shape in surfaces.shapes], [shape.emission for shape in surfaces.shapes]
+    )
     table = surfaces.table.copy()
     table["front"], table["back"] = materials.sides.T
     table["emitter"] = lights.of_shape

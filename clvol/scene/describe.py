@@ -33,6 +33,8 @@ from clvol.volumes.read import SPARSE, list_sparse, read_sparse
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from clvol.scene.materials import Texture
+
 MOST_FILES = 20
 """Names of files that are listed."""
 
@@ -223,7 +225,7 @@ def _shape(shape: records.Shape) -> str:
     if not isinstance(shape.bsdf, Null):
         parts.append(_bsdf(shape.bsdf))
     if shape.emission:
-        parts.append(f"radiance {_spectrum(shape.emission)}")
+        parts.append(f"radiance {_radiance(shape.emission)}")
     if shape.exterior:
         parts.append(f"exterior: {_medium(shape.exterior)}")
     if shape.interior:
@@ -329,6 +331,10 @@ def _emitter(emitter: records.Emitter) -> str:
                 f"sun, irradiance {_spectrum(emitter.irradiance)}, towards "
                 f"{_point(emitter.sun_direction)}, {_number(emitter.aperture)} degrees wide"
             )
+
+
+def _radiance(emission: Texture) -> str:
+    return _spectrum(emission) if isinstance(emission, tuple) else "by a texture"
 
 
 def _box(box: np.ndarray) -> str:

@@ -9,15 +9,16 @@ import numpy as np
 from clvol.base.rows import bands
 from clvol.scene.files import find_parameter
 from clvol.scene.image import image_from_array, read_image
+from clvol.scene.materials import Bitmap, Checkerboard, Texture
 from clvol.scene.reader import BRIGHTEST, Reader
 from clvol.scene.records import (
     ConstantEmitter,
     DirectionalEmitter,
     EnvmapEmitter,
     PointEmitter,
-    Spectrum,
     SpotEmitter,
 )
+from clvol.scene.texture import texture
 from clvol.scene.transforms import keeps_angles
 
 MOST_INTENSE = 1e30
@@ -27,11 +28,11 @@ NEGLIGIBLE = 1e-5
 """Share of the brightest value down to which negative values are rounding (colours out of the gamut)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class AreaLight:
     """What an `area` emitter adds to the shape it is in."""
 
-    radiance: Spectrum
+    radiance: Texture
 
 
 def constant(reader: Reader) -> ConstantEmitter:
@@ -125,15 +126,25 @@ def spot(reader: Reader) -> SpotEmitter:
 
 
 def area(reader: Reader) -> AreaLight:
-    """The `area` plugin, which makes the shape round it a light of the same radiance all over."""
+    """The `area` plugin, which makes the shape round it a light: of one radiance, or of a texture of them."""
     accept_common(reader)
-    if reader.has("radiance") and not reader.is_value("radiance"):
-        reader.fail(
-            "the radiance of an area emitter cannot vary over the shape",
-            "radiance",
-            "give a number, an rgb or a spectrum",
-        )
-    return AreaLight(reader.color("radiance", 1.0, light=True, maximum=BRIGHTEST))
+    if reader.is_value("radiance"):
+        return AreaLight(reader.color("radiance", 1.0, light=True, maximum=BRIGHTEST))
+    found = texture(reader, "radiance", 1.0, BRIGHTEST)
+    if type(found) not in (Bitmap, Checkerboard):  # as attributes of meshes are
+        reader.refuse_plugin("radiance", "a number, an rgb, a spectrum, a bitmap or a checkerboard")
+    return AreaLight(found)
+
+
+def directionalarea(reader: Reader) -> AreaLight:
+    """The `directionalarea` plugin, which path tracers do not see: none meets its one direction by chance."""
+    accept_common(reader)
+    if reader.is_value("radiance"):
+        reader.color("radiance", 1.0, light=True, maximum=BRIGHTEST)
+    else:
+        texture(reader, "radiance", 1.0, BRIGHTEST)
+    reader.approximated("black, as Mitsuba's path tracers see it: its one direction is met by no chance")
+    return AreaLight((0.0,))
 
 
 def accept_common(reader: Reader) -> None:

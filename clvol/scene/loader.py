@@ -128,6 +128,7 @@ PLUGINS: PluginTable = {
         "point": emitter.point,
         "spot": emitter.spot,
         "area": emitter.area,
+        "directionalarea": emitter.directionalarea,
         "sunsky": sunsky.sunsky,
         "timed_sunsky": timed_sunsky.timed_sunsky,
     },

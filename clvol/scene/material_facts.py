@@ -34,11 +34,12 @@ def _numbers(side: Side) -> list[Texture | float]:
     return [getattr(side.bsdf, name) for name in _NUMBERS if hasattr(side.bsdf, name)]
 
 
-def _color_is_grey(color: Texture) -> bool:
+def color_is_grey(color: Texture) -> bool:
+    """Whether all channels are alike, of a texture everywhere."""
     if isinstance(color, Bitmap):
         return bool((color.pixels == color.pixels[..., :1]).all())
     if isinstance(color, Checkerboard):
-        return _color_is_grey(color.color0) and _color_is_grey(color.color1)
+        return color_is_grey(color.color0) and color_is_grey(color.color1)
     return len(set(color)) == 1
 
 
@@ -71,7 +72,7 @@ def is_grey(bsdf: Bsdf) -> bool:
     """Whether it treats all channels alike; opacities always do."""
     colors = [color for side in bsdf_parts(bsdf) for color in _colors(side)]
     metals = [s.bsdf for s in bsdf_parts(bsdf) if isinstance(s.bsdf, Conductor | RoughConductor)]
-    return all(_color_is_grey(color) for color in colors) and all(
+    return all(color_is_grey(color) for color in colors) and all(
         len(set(value)) == 1 for metal in metals for value in (metal.eta, metal.k)
     )
 
@@ -103,6 +104,11 @@ def bsdf_textures(bsdf: Bsdf) -> list[Bitmap | Checkerboard]:
     found = [t for side in bsdf_parts(bsdf) for t in (*_colors(side), *_numbers(side), *side.opacities)]
     found += bsdf_weights(bsdf) + [_bend_map(bend) for bend in bsdf_bends(bsdf)]
     return [t for t in found if isinstance(t, Bitmap | Checkerboard)]
+
+
+def is_textured(color: Texture | None) -> bool:
+    """Whether a colour is one over (u, v)."""
+    return isinstance(color, Bitmap | Checkerboard)
 
 
 def has_rough_textures(bsdf: Bsdf) -> bool:

@@ -128,7 +128,7 @@ def _film(film: records.Film) -> Found:
 def _shape(shape: records.Shape, seen: set[int]) -> Found:
     check = values.matrix(values.fits_shape(shape))
     yield "to_world", _field(shape, "to_world", check, values.frozen)
-    if shape.emission is not None:
+    if isinstance(shape.emission, tuple):
         yield "emitter.radiance.value", _colour(shape, "emission", values.BRIGHTEST)
     yield from _nested("bsdf", _bsdf(shape.bsdf, seen))
     for side in ("interior", "exterior"):

@@ -16,7 +16,7 @@ from clvol.scene.films import Film as Film
 from clvol.scene.films import ReconstructionFilter as ReconstructionFilter
 from clvol.scene.films import Sampler as Sampler
 from clvol.scene.kept import Kept
-from clvol.scene.materials import Bsdf, Null
+from clvol.scene.materials import Bsdf, Null, Texture
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -282,7 +282,7 @@ class Shape:
         +z, the unit "disk" with normal +z, the "cylinder" of radius 1 and z in 0..1 (open, normals outward),
         or the "mesh" in `mesh`.
     interior, exterior : media behind the surface and before it (the side its normals point to).
-    emission : radiance of the front side; None where the shape is no light.
+    emission : radiance of the front side, the same all over or a texture; None where the shape is no light.
     flip_normals : front and back change places.
     """
 
@@ -291,7 +291,7 @@ class Shape:
     interior: Medium | None = None
     exterior: Medium | None = None
     bsdf: Bsdf = NO_SURFACE
-    emission: Spectrum | None = None
+    emission: Texture | None = None
     flip_normals: bool = False
     mesh: Mesh | None = None
     name: str = ""

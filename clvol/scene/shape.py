@@ -12,7 +12,7 @@ from clvol.errors import SceneError
 from clvol.scene.curves import read_curves
 from clvol.scene.emitter import AreaLight
 from clvol.scene.files import find_parameter
-from clvol.scene.material_facts import has_textures
+from clvol.scene.material_facts import has_textures, is_textured
 from clvol.scene.materials import Diffuse, FrontOnly
 from clvol.scene.mesh_arrays import read_arrays
 from clvol.scene.mesh_attributes import with_attributes
@@ -21,7 +21,7 @@ from clvol.scene.records import Medium, Mesh, Shape
 from clvol.scene.transforms import check_size, frame, keeps_angles, scale, translate
 
 if TYPE_CHECKING:
-    from clvol.scene.materials import Bsdf
+    from clvol.scene.materials import Bsdf, Texture
     from clvol.scene.reader import Reader
 
 log = logging.getLogger("clvol")
@@ -163,7 +163,7 @@ def _shape(reader: Reader, kind: str, to_world: np.ndarray, triangles: Mesh | No
         mesh=triangles,
         name=reader.node.id,
     )
-    if triangles is not None and triangles.uvs is None and has_textures(made.bsdf):
+    if triangles is not None and triangles.uvs is None and (has_textures(made.bsdf) or is_textured(emission)):
         name = made.name or triangles.source
         log.warning(
             "%s has a texture and no texture coordinates: it shows the texture's (0, 0) all over", name
@@ -171,7 +171,7 @@ def _shape(reader: Reader, kind: str, to_world: np.ndarray, triangles: Mesh | No
     return made
 
 
-def _emission(reader: Reader) -> tuple[float, ...] | None:
+def _emission(reader: Reader) -> Texture | None:
     """Radiance of the `area` emitter inside, if there is one."""
     node = reader.only_child("emitter")
     if node is None:

@@ -12,6 +12,7 @@ from clvol.scene.files import find_parameter
 from clvol.scene.image import image_from_array, read_image
 from clvol.scene.materials import Bitmap, Checkerboard, Roughness, Texture
 from clvol.scene.nodes import Node
+from clvol.scene.reader import BRIGHTEST
 
 if TYPE_CHECKING:
     from clvol.scene.reader import Reader
@@ -21,7 +22,7 @@ NEGLIGIBLE = 1e-4
 
 
 def bitmap(reader: Reader) -> Bitmap:
-    """The `bitmap` plugin: a picture from a file or an array, of values in [0, 1] after decoding."""
+    """The `bitmap` plugin: a picture from a file or an array.  What it is for bounds its values."""
     reader.ignore(accel=bool, format=str)
     if reader.has("filename") == reader.has("bitmap"):
         reader.fail("a bitmap texture needs either a filename or a bitmap (array)")
@@ -32,7 +33,7 @@ def bitmap(reader: Reader) -> Bitmap:
     else:
         place = source = "bitmap"
         pixels = image_from_array(reader.array(place), reader.node.place(place), raw)
-    if fault := check_texels(pixels):
+    if fault := check_texels(pixels, BRIGHTEST):
         reader.fail(fault, place)
     return Bitmap(
         pixels,
@@ -43,16 +44,16 @@ def bitmap(reader: Reader) -> Bitmap:
     )
 
 
-def check_texels(pixels: np.ndarray) -> str:
-    """Cut what lies beyond 0..1 by rounding, in place; what is wrong with the others, "" if nothing."""
+def check_texels(pixels: np.ndarray, maximum: float = 1.0) -> str:
+    """Cut what is beyond 0..`maximum` by rounding, in place; what is wrong with the others, "" if nothing."""
     for rows in bands(*pixels.shape[:2]):
         band = pixels[rows]
-        broken = ~((band >= -NEGLIGIBLE) & (band <= 1 + NEGLIGIBLE))
+        broken = ~((band >= -NEGLIGIBLE) & (band <= maximum + NEGLIGIBLE))
         if broken.any():
             row, column = np.argwhere(broken)[0][:2]
             shown, row = band[row, column].tolist(), rows.start + row
-            return f"texels must be in [0, 1]; at row {row}, column {column} there is {shown}"
-        np.clip(band, 0, 1, out=band)
+            return f"texels must be in [0, {maximum:g}]; at row {row}, column {column} there is {shown}"
+        np.clip(band, 0, maximum, out=band)
     return ""
 
 
@@ -61,8 +62,10 @@ def checkerboard(reader: Reader) -> Checkerboard:
     for name in ("color0", "color1"):
         if not reader.is_value(name):
             reader.refuse_plugin(name, "a number, an rgb or a spectrum (no texture in a texture)")
-    color0 = reader.color("color0", 0.4, maximum=1.0)
-    return Checkerboard(color0, reader.color("color1", 0.2, maximum=1.0), _to_uv(reader))
+    color0, color1 = (
+        reader.color(name, value, maximum=BRIGHTEST) for name, value in (("color0", 0.4), ("color1", 0.2))
+    )
+    return Checkerboard(color0, color1, _to_uv(reader))
 
 
 def texture(reader: Reader, name: str, default: float, maximum: float = 1.0) -> Texture:
@@ -80,7 +83,18 @@ def texture(reader: Reader, name: str, default: float, maximum: float = 1.0) -> 
     if not found:
         reader.refuse_plugin(name, "a number, an rgb, a spectrum or a texture")
     picture: Texture = reader.build(found[0][1])
+    if maximum <= BRIGHTEST and (fault := _beyond(picture, maximum)):
+        reader.fail(f"'{name}' of {reader.kind} '{reader.type}': {fault}", name)
     return picture
+
+
+def _beyond(picture: object, maximum: float) -> str:
+    """What of a texture is beyond a maximum, "" if nothing; texels that are so by rounding are cut."""
+    if isinstance(picture, Bitmap) and picture.pixels.max() > maximum:
+        return check_texels(picture.pixels, maximum)
+    if isinstance(picture, Checkerboard) and max(*picture.color0, *picture.color1) > maximum:
+        return f"colors must be in [0, {maximum:g}]"
+    return ""
 
 
 def share(reader: Reader, name: str) -> Texture:

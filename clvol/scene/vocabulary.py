@@ -24,7 +24,7 @@ LATER: dict[str, tuple[str, ...]] = {
         *("pplastic", "polarizer", "retarder", "circular"),
     ),
     "phase": ("sggx",),
-    "emitter": ("projector", "directionalarea"),
+    "emitter": ("projector",),
     "texture": ("volume",),
 }
 """Kind -> plugins known by name and not supported in this version."""

@@ -15,8 +15,10 @@ from clvol.scene.primitives import QUADRICS
 from clvol.tables.affine import rotation_3x4
 from clvol.tables.colours import luminance, mean_luminance, rgb
 from clvol.tables.environment import envmap_distribution
+from clvol.tables.textures import lamp_textures, mean_radiance
 
 if TYPE_CHECKING:
+    from clvol.scene.materials import Texture
     from clvol.tables.surfaces import Surfaces
 
 RANDOM_STEPS = 2.0**32
@@ -68,6 +70,7 @@ def light_table(
     power = np.zeros(len(table))
     for i, emitter in enumerate(emitters):
         power[i] = _describe_emitter(table[i], emitter, centre, radius)
+    pictures = lamp_textures(emission for _, emission in shining)
     faces, cdf = [np.zeros(0, np.uint32)], [np.zeros(0, np.float32)]
     if surfaces is not None:
         for i, (number, emission) in enumerate(shining, len(emitters)):
@@ -79,6 +82,8 @@ def light_table(
                 faces.append(members)
                 cdf.append(shares)
             power[i] = _describe_area(table[i], shapes[number], emission, number, centre)
+            if emission in pictures:
+                table[i]["beam_width"] = 1 + pictures.index(emission)
     late = np.where(table["kind"] == layout.enum("EMITTER", "sun"), np.inf, power)
     order = np.argsort(late, kind="stable")
     if len(order):
@@ -171,7 +176,7 @@ def _is_environment(emitter: records.Emitter) -> bool:
 
 
 def _describe_area(
-    record: np.void, shape: records.Shape, emission: records.Spectrum, number: int, centre: np.ndarray
+    record: np.void, shape: records.Shape, emission: Texture, number: int, centre: np.ndarray
 ) -> float:
     """Fill in an area light and return its power; a mesh's area and place are there already."""
     if shape.kind in QUADRICS:
@@ -184,8 +189,8 @@ def _describe_area(
             record["vector"] *= -1 if shape.flip_normals else 1
     record["kind"] = layout.enum("EMITTER", "area")
     record["shape"] = number
-    record["value"] = rgb(emission)
-    return np.pi * float(record["area"]) * float(luminance(rgb(emission)))
+    record["value"] = mean_radiance(emission)
+    return np.pi * float(record["area"]) * float(luminance(mean_radiance(emission)))
 
 
 def _describe_emitter(record: np.void, emitter: records.Emitter, centre: np.ndarray, radius: float) -> float:

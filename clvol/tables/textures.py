@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from clvol import layout
 from clvol.base.rows import bands
 from clvol.scene.materials import Bitmap, Checkerboard, Texture
-from clvol.tables.colours import luminance
+from clvol.tables.colours import luminance, rgb
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 
 def mean_color(texture: Texture) -> float:
@@ -17,6 +22,23 @@ def mean_color(texture: Texture) -> float:
     if isinstance(texture, Checkerboard):
         return 0.5 * float(np.mean(texture.color0) + np.mean(texture.color1))
     return float(np.mean(texture))
+
+
+def mean_radiance(texture: Texture) -> np.ndarray:
+    """Mean colour of a texture over its unit square, float64 (3,)."""
+    mean: np.ndarray
+    if isinstance(texture, Bitmap):
+        mean = texture.pixels.mean((0, 1), dtype=np.float64)
+    elif isinstance(texture, Checkerboard):
+        mean = np.mean([rgb(texture.color0), rgb(texture.color1)], axis=0)
+    else:
+        mean = rgb(texture)
+    return mean
+
+
+def lamp_textures(emissions: Iterable[Texture | None]) -> list[Bitmap | Checkerboard]:
+    """The textures of lights, each once, in the order in which they come before all others."""
+    return list(dict.fromkeys(e for e in emissions if isinstance(e, Bitmap | Checkerboard)))
 
 
 class TextureTable:

@@ -386,7 +386,8 @@ PARAMETERS = {
         | {"start_year": 2027, "start_month": 6, "start_day": 3, "window_end_time": Silent(20.0)}
         | {"end_year": Silent(2031), "end_month": Silent(5), "end_day": Silent(30)},
     ),
-    "area": ({}, LIGHT | {"radiance": RGB}),
+    "area": ({}, LIGHT | {"radiance": TEXTURE}),
+    "directionalarea": ({}, LIGHT | {"radiance": Silent(RGB)}),
     "bitmap": (
         {"bitmap": TEXELS},
         {

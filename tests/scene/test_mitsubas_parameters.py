@@ -26,6 +26,7 @@ MITSUBAS = {
     "point": "intensity position sampling_weight to_world",
     "spot": "beam_width cutoff_angle intensity sampling_weight texture to_world",
     "area": "radiance sampling_weight to_world",
+    "directionalarea": "radiance sampling_weight",
     "sunsky": (
         "albedo complex_sun day hour latitude longitude minute month sampling_weight second sky_scale "
         "sun_aperture sun_direction sun_scale timezone to_world turbidity year"

@@ -24,6 +24,7 @@ from clvol.volumes import write_vol
 # -- scenes --------------------------------------------------------------------------------------------
 
 KIND_OF = {name: kind for kind, names in PLUGINS.items() for name in names}
+AREA = ("area", "directionalarea")
 SIMPLEST = {
     **{kind: {"type": next(iter(names))} for kind, names in PLUGINS.items()},
     "film": {"type": "hdrfilm", "width": 5},
@@ -88,7 +89,7 @@ def scene_of(plugin):
     kind, light = KIND_OF[plugin["type"]], {}
     if plugin["type"] == "shapegroup":
         plugin = {"type": "instance", "group": plugin}
-    if kind in ("integrator", "shape") or (kind == "emitter" and plugin["type"] != "area"):
+    if kind in ("integrator", "shape") or (kind == "emitter" and plugin["type"] not in AREA):
         light = {"plugin": plugin}
     film = {"type": "hdrfilm", "rfilter": plugin} if kind == "rfilter" else {"type": "hdrfilm"}
     inside = {"film": plugin if kind == "film" else film} | ({"sampler": plugin} if kind == "sampler" else {})
@@ -96,7 +97,7 @@ def scene_of(plugin):
     texture = {"type": "diffuse", "reflectance": plugin} if kind == "texture" else {"type": "diffuse"}
     wall = PAINTED if plugin["type"] == "mesh_attribute" else {"type": "rectangle"}
     wall = wall | {"bsdf": plugin if kind == "bsdf" else texture}
-    if plugin["type"] == "area":
+    if plugin["type"] in AREA:
         wall["emitter"] = plugin
     medium = {"type": "heterogeneous"}
     if kind in ("volume", "phase"):
