@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from clvol.scene.old_mixtures import MIXTURES, blended
 from clvol.scene.old_names import NOT_HEEDED, NULL_IN_MEDIA, ON_ALL, RULES, SKIES, TAGS, UV, Rule
 from clvol.scene.spectra import srgb_to_linear
 from clvol.scene.xml_tree import Element
@@ -67,6 +68,8 @@ def _linear(text: str, encoded: bool) -> dict[str, str]:
 def _plugin(element: Element, faults: Faults) -> Element:
     """A plugin's element, whose children are upgraded."""
     kind, name = element.tag, element.attributes["type"]
+    if (kind, name) in MIXTURES:
+        return blended(element, faults)
     rule = RULES.get((kind, name), Rule())
     dropped = (*rule.dropped, *ON_ALL.get(kind, ()))
     children = [_parameter(child, rule) for child in element.children]

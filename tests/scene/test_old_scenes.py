@@ -242,3 +242,37 @@ def test_what_an_old_sky_below_the_horizon_had_is_said():
     assert (
         "horizon" in old('<emitter type="sky"><float name="stretch" value="1.2"/></emitter>').approximated[0]
     )
+
+
+def test_mixtures_of_any_number_are_blends_of_two():
+    def mixture(kind, weights, *parts):
+        inside = f'<string name="weights" value="{weights}"/>' + "".join(parts)
+        return f'<{kind} type="mixture{kind}">{inside}</{kind}>'
+
+    def ball(bsdf):
+        return f'<shape type="sphere">{bsdf}</shape>'
+
+    def fog(phase):
+        return f'<shape type="cube"><medium name="interior" type="homogeneous">{phase}</medium></shape>'
+
+    a, b, c = '<bsdf type="diffuse"/>', '<bsdf type="plastic"/>', '<bsdf type="null"/>'
+    three = old(ball(mixture("bsdf", "0.2 0.3, 0.5", a, b, c))).shapes[0].bsdf
+    assert three.weight == (pytest.approx(0.8),) and three.second.weight == (pytest.approx(0.625),)
+    assert isinstance(three.first, Diffuse) and isinstance(three.second.second, Null)
+    dark = old(ball(mixture("bsdf", "0.5, 0.25", a, c))).shapes[0].bsdf
+    assert dark.second.weight == (0.5,) and dark.second.second.reflectance == (0.0,)
+    bright = old(ball(mixture("bsdf", "2, 6", a, c))).shapes[0].bsdf
+    assert bright.weight == (0.75,)
+    lobes = '<phase type="isotropic"/>', '<phase type="hg"><float name="g" value="0.5"/></phase>'
+    thin = old(fog(mixture("phase", "0.1, 0.3", *lobes)))
+    assert (
+        thin.shapes[0].interior.phase.weight == pytest.approx(0.75) and "add up to 1" in thin.approximated[0]
+    )
+    alone = old('<bsdf id="x" type="plastic"/>', ball(mixture("bsdf", "1", '<ref id="x"/>'))).shapes[0].bsdf
+    assert alone.first is alone.second
+    wrong = {"1": "as many weights", "1, x": "must be numbers", "0, 0": "not all 0", "1, nan": ">= 0"}
+    for weights, told in wrong.items():
+        with pytest.raises(clvol.SceneError, match=told):
+            old(ball(mixture("bsdf", weights, a, b)))
+    with pytest.raises(clvol.SceneError, match="unknown bsdf 'mixturebsdf'"):
+        new(ball(mixture("bsdf", "1, 2", a, b)))
