@@ -172,6 +172,11 @@ def test_every_header_includes_what_it_uses():
         assert not known & set(USED.findall(text)) - defined(text), f"{name} does not include what it uses"
 
 
+def test_members_are_named_in_full_beside_their_arrow():
+    """By these names it is seen which buffers a unit uses; the others are null there."""
+    assert not re.search(r"->\s|->\w*##|##\w*(?:->|\.)", ALL)
+
+
 def test_nothing_is_defined_that_nothing_uses():
     defined = {
         (name, word)
