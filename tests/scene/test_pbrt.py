@@ -223,6 +223,8 @@ def test_what_cannot_be_rendered_is_told_at_once(load):
         ('Shape "sphere" "float radius" "two"', "takes numbers"),
         ('Shape "sphere" "float radius" nan', "'radius' has no value"),
         ('Shape "sphere" "float radius" [nan]', "must be finite"),
+        ('Shape "sphere" "float radius" [1 true]', "'true' is not a number"),
+        ('Shape "sphere" "float radius" [true 1x]', "'1x' is not a number"),
         ('Shapes "sphere"', "did you mean 'Shape'"),
         ('NamedMaterial "m" Shape "sphere"', "no material 'm'"),
         ('MediumInterface "m" "" Shape "sphere"', "no medium 'm'"),

@@ -6,6 +6,7 @@ import gzip
 import re
 import zlib
 from dataclasses import dataclass
+from itertools import filterfalse
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -175,10 +176,10 @@ def _numbers_or_words(body: bytes, where: str) -> Values:
             parts.append(np.fromiter(map(float, body[at:end].split()), np.float64))
             at = end
     except ValueError:
-        words = body.split(maxsplit=_PART)
-        if all(word in (b"true", b"false") for word in words):
+        words, truths = body.split(maxsplit=_PART), (b"true", b"false")
+        if all(word in truths for word in words):
             return [word.decode() for word in words]
-        wrong = next(word for word in words if word not in (b"true", b"false") and not _is_number(word))
+        wrong = min(filterfalse(_is_number, words), key=truths.__contains__)  # a truth where nothing else is
         raise SceneError(
             f"'{shortened(wrong.decode('utf-8', 'replace'), 60)}' is not a number", where
         ) from None
