@@ -88,6 +88,7 @@ def test_plates_under_a_slanting_sun_show_their_bent_normals():
         assert result.image[0, n, 0] == pytest.approx(expected, rel=2e-5, abs=4 * error), name
 
 
+@pytest.mark.contract
 def test_what_is_sampled_has_the_values_that_lights_are_seen_by():
     """White light all round, found by paths or sampled: pictures differ where pdfs or values disagree."""
     coat = {"type": "roughplastic", "alpha": 0.3}

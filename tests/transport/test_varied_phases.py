@@ -11,6 +11,7 @@ from clvol.scene import look_at, scale, translate
 
 WEIGHTS = np.array([0.0, 1.0, 0.25, 2.0])
 """Of the columns; Mitsuba cuts what is beyond 1."""
+SUN = {"type": "directional", "direction": [0.3, -0.8, 0.4]}
 FIRST, SECOND = {"type": "hg", "g": 0.7}, {"type": "rayleigh"}
 
 
@@ -18,7 +19,7 @@ def column(phase):
     return {"type": "homogeneous", "sigma_t": 0.5, "albedo": 0.9, "phase": phase}
 
 
-def slab(medium):
+def slab(medium, light=None):
     camera = {
         "type": "orthographic",
         "to_world": look_at([0, 0, 5], [0, 0, 0], [0, 1, 0]) @ scale([4, 4, 1]),
@@ -30,7 +31,7 @@ def slab(medium):
             "type": "scene",
             "sensor": camera,
             "integrator": {"type": "volpath", "max_depth": 2},
-            "sun": {"type": "directional", "direction": [0.3, -0.8, 0.4]},
+            "light": SUN if light is None else light,
             "slab": cube,
         }
     )
@@ -40,17 +41,16 @@ def image(scene, seed):
     return render(scene, spp=1 << 17, seed=seed)
 
 
-@pytest.fixture
-def varied():
+def mixture():
     data = WEIGHTS[None, None, :].repeat(2, 0).repeat(2, 1)
     volume = {"type": "gridvolume", "data": data, "filter_type": "nearest"}
     volume["to_world"] = translate([-4, -1, -1]) @ scale([8, 2, 2])
-    return slab(column({"type": "blendphase", "weight": volume, "a": FIRST, "b": SECOND}))
+    return column({"type": "blendphase", "weight": volume, "a": FIRST, "b": SECOND})
 
 
 @pytest.mark.parametrize("flipped", [False, True])
-def test_each_column_has_its_mixture(varied, flipped):
-    scene, weights = varied, np.minimum(WEIGHTS, 1)
+def test_each_column_has_its_mixture(flipped):
+    scene, weights = slab(mixture()), np.minimum(WEIGHTS, 1)
     if flipped:
         parameters = traverse(scene)
         name = "slab.interior_medium.phase_function.weight.data"
@@ -64,3 +64,14 @@ def test_each_column_has_its_mixture(varied, flipped):
     error = np.sqrt(found.variance + one.variance + other.variance)[0]
     assert (error < 0.01 * expected).all() and (np.abs(found.image[0] - expected) < 4.5 * error).all()
     assert np.ptp(expected[:, 0]) > 0.2 * expected.mean()
+
+
+@pytest.mark.contract
+def test_directions_are_drawn_as_lights_are_weighed():
+    """A sky with a bright spot, found by paths alone or sampled too: they differ where pdf and samples do."""
+    sky = np.full((8, 16, 3), 0.1)
+    sky[3:5, 2:5] = 5
+    scene = slab(mixture(), {"type": "envmap", "bitmap": sky})
+    found, sampled = (render(scene, spp=1 << 17, seed=4, transmittance=t) for t in ("none", "ratio"))
+    error = np.sqrt(found.variance + sampled.variance)
+    assert (error < 0.01 * sampled.image).all() and (np.abs(found.image - sampled.image) < 4.5 * error).all()
