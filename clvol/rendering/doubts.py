@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from clvol.errors import Told, option
+from clvol.tables.apart import peak_extinction
 
 if TYPE_CHECKING:
     from clvol.picture.result import Result
@@ -23,7 +24,9 @@ class Expected:
 
     Parameters
     ----------
-    density : its paths look a density up, if they meet a medium.  dense : there is any.
+    density : its paths look a density up, if they meet a medium; not of one that is empty on purpose and
+        glows.
+    dense : some medium has an extinction somewhere.
     light : there are lights, or media that glow.
     needs_bound : look-ups above their majorant bias it.
     """
@@ -36,11 +39,12 @@ class Expected:
     @classmethod
     def of(cls, session: Session) -> Expected:
         """Of a session's plan and tables."""
-        features = session.plan.features
-        tables = [table for table in session.prepared.majorants if table is not None]
+        features, prepared = session.plan.features, session.prepared
+        media = enumerate(prepared.matter.media)
+        dense = any(bool(peak_extinction(medium, prepared.density(n)).any()) for n, medium in media)
         return cls(
-            bool(features.heterogeneous and not features.homogeneous),
-            any(bool(table.majorant.any()) for table in tables),
+            bool(features.heterogeneous and not features.homogeneous and (dense or not features.glow)),
+            dense,
             bool(features.emitters or features.emission or features.glow),
             session.plan.needs_bound,
         )
@@ -75,7 +79,7 @@ def say_doubts(result: Result, expected: Expected) -> None:
         )
     if stats["largest_sample"] == 0 and expected.light:
         log.warning("no sample met any light: the picture may be black by chance, its noise is unknown")
-    elif result.met_nothing and not result.variance.any():
+    elif expected.dense and result.met_nothing and not result.variance.any():
         log.warning(
             "no path met anything in the media, and all samples are the same: what is rare there has not "
             "been seen, and the noise is only a bound"
