@@ -27,6 +27,8 @@ TOLERANCE = 0.01
 MOST_STEPS = 64
 """Most steps along a piece of a spline."""
 _BYTES_A_TRIANGLE = 200
+_SLANTED = 0.1
+"""Squared sine between a curve and an axis beyond which frames may follow the axis."""
 _BASIS = np.array([[1, 4, 1, 0], [-3, 0, 3, 0], [3, -6, 3, 0], [-1, 3, -3, 1]]) / 6
 """Powers of t from four control points of a uniform cubic B-spline."""
 
@@ -180,6 +182,12 @@ def _grid(vertices: np.ndarray, normals: np.ndarray, uvs: np.ndarray, poles: boo
 
 def _frames(tangents: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Two unit vectors across each tangent (n, 3), which turn as little as may be from one to the next."""
+    away = 1 - tangents**2  # of each coordinate axis from the tangents, squared sines
+    best = away.min(axis=0).argmax()
+    if away[:, best].min() > _SLANTED:  # one axis will do for all
+        across = np.eye(3)[best] - tangents * tangents[:, best, None]
+        across /= np.linalg.norm(across, axis=1, keepdims=True)
+        return across, np.cross(tangents, across)
     across = np.zeros_like(tangents)
     axis = np.zeros(3)
     axis[np.abs(tangents[0]).argmin()] = 1

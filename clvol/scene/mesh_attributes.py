@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clvol.scene.material_facts import bsdf_textures
-from clvol.scene.materials import Bitmap, Bsdf, MeshAttribute, Texture
+from clvol.scene.materials import Bitmap, Bsdf, BumpMap, MeshAttribute, NormalMap, Texture
 from clvol.scene.sides import bsdf_parts
 from clvol.scene.texture import check_texels
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from clvol.scene.reader import Reader
     from clvol.scene.records import Mesh
@@ -65,6 +65,8 @@ def with_attributes(reader: Reader, bsdf: Bsdf, mesh: Mesh | None) -> tuple[Bsdf
     for key, texture in wanted.items():
         if texture.name not in given:
             of_mesh[key] = texture
+        elif isinstance(given[texture.name], MeshAttribute):
+            reader.fail(f"the texture '{texture.name}' is itself a mesh_attribute", texture.name)
         elif texture.scale != 1:
             what = f"'scale' of a mesh_attribute that shows the texture '{texture.name}'"
             reader.unsupported(f"{what} is not supported", texture.name)
@@ -87,6 +89,14 @@ def _attributes(bsdf: Any) -> list[MeshAttribute]:
     return [found for field in fields(bsdf) for found in _attributes(getattr(bsdf, field.name))]
 
 
+def _parts(bsdf: Any) -> Iterator[Any]:
+    """A BSDF, and all that is nested in it."""
+    if is_dataclass(bsdf) and not isinstance(bsdf, Bitmap):
+        yield bsdf
+        for field in fields(bsdf):
+            yield from _parts(getattr(bsdf, field.name))
+
+
 def _with(record: Any, pictures: Mapping[int, Texture]) -> Any:
     """A BSDF with `pictures` in the place of attributes, by their id()."""
     if id(record) in pictures:
@@ -101,6 +111,8 @@ def _with(record: Any, pictures: Mapping[int, Texture]) -> Any:
 
 def _check_alone(reader: Reader, bsdf: Bsdf, mesh: Mesh, mixed: bool) -> None:
     """Attributes take the place of texture coordinates: what needs these cannot be in the same BSDF."""
+    if any(isinstance(part, NormalMap | BumpMap) for part in _parts(bsdf)):
+        reader.unsupported("attributes of a mesh under or in a map of normals or bumps are not supported")
     others = any(not isinstance(texture, MeshAttribute) for texture in bsdf_textures(bsdf))
     if others or mixed:
         reader.unsupported(
@@ -121,7 +133,9 @@ def _picture(reader: Reader, texture: MeshAttribute, values: np.ndarray, mesh: M
     """An attribute, float32 (vertices or faces, 1 or 3), over the texture coordinates of `_apart`."""
     of_faces = texture.name.startswith("face_")
     corners = values[:, None].repeat(3, axis=1) if of_faces else values[mesh.faces]
-    corners = np.array(np.broadcast_to(corners * np.float32(texture.scale), (*corners.shape[:2], 3)))
+    with np.errstate(over="ignore"):
+        corners = (corners * texture.scale).astype(np.float32)
+    corners = np.array(np.broadcast_to(corners, (*corners.shape[:2], 3)))
     if fault := check_texels(corners):
         found, largest = fault.partition("; ")[0], float(corners.max())
         reader.fail(

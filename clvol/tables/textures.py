@@ -8,7 +8,8 @@ import numpy as np
 
 from clvol import layout
 from clvol.base.rows import bands
-from clvol.scene.materials import Bitmap, Checkerboard, Texture
+from clvol.errors import SceneError
+from clvol.scene.materials import Bitmap, Checkerboard, MeshAttribute, Texture
 from clvol.tables.colours import luminance, rgb
 
 if TYPE_CHECKING:
@@ -64,6 +65,9 @@ class TextureTable:
         return self._numbers[key]
 
     def _record(self, texture: Bitmap | Checkerboard, as_number: bool) -> np.ndarray:
+        if isinstance(texture, MeshAttribute):
+            what = f"the mesh_attribute '{texture.name}' stands where no mesh gives it a value"
+            raise SceneError(what, hint="attributes are for the BSDFs of shapes")
         record = np.zeros((), layout.TEXTURE)
         record["to_uv"] = texture.to_uv[:2].reshape(-1)
         if isinstance(texture, Checkerboard):

@@ -177,6 +177,21 @@ def test_shapes_of_one_bsdf_show_what_each_has():
         ),
         (shows("vertex_a", scale=0.5), {"vertex_a": {"type": "checkerboard"}}, "'scale' of a mesh_attribute"),
         (
+            {
+                "type": "normalmap",
+                "normalmap": {"type": "bitmap", "bitmap": np.ones((1, 1, 3))},
+                "b": shows("vertex_a"),
+            },
+            {"vertex_a": np.ones(4)},
+            "under or in a map of normals",
+        ),
+        (
+            shows("vertex_a"),
+            {"vertex_a": {"type": "mesh_attribute", "name": "vertex_a"}},
+            "is itself a mesh_attr",
+        ),
+        (shows("vertex_a", scale=1e300), {"vertex_a": np.ones(4)}, "the largest is inf"),
+        (
             {"type": "roughconductor", "alpha_u": 0.1, "alpha_v": 0.3}
             | {"specular_reflectance": {"type": "mesh_attribute", "name": "vertex_a"}},
             {"vertex_a": np.ones(4), "vertex_texcoords": CORNERS[:, :2]},
