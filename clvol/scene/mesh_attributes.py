@@ -40,10 +40,13 @@ def mesh_attribute(reader: Reader) -> MeshAttribute:
     return MeshAttribute(name=name, scale=reader.number("scale", 1.0, minimum=0.0))
 
 
-def with_attributes(reader: Reader, bsdf: Bsdf, mesh: Mesh | None) -> tuple[Bsdf, Mesh | None]:
+def with_attributes(
+    reader: Reader, bsdf: Bsdf, mesh: Mesh | None, lit_by_texture: bool = False
+) -> tuple[Bsdf, Mesh | None]:
     """The BSDF and the mesh of the shape that `reader` reads, with pictures in the place of attributes.
 
     Attributes are the mesh's, or textures of the shape that have their names.  What nothing shows is dropped.
+    `lit_by_texture`: the shape emits by one.
     """
     given = {name: reader.build(node) for name, node in reader.children("texture")}
     wanted = {id(texture): texture for texture in _attributes(bsdf)}
@@ -73,7 +76,7 @@ def with_attributes(reader: Reader, bsdf: Bsdf, mesh: Mesh | None) -> tuple[Bsdf
         else:
             pictures[key] = given[texture.name]
     if mesh is not None and of_mesh:
-        _check_alone(reader, bsdf, mesh, len(of_mesh) < len(wanted))
+        _check_alone(reader, bsdf, mesh, lit_by_texture or len(of_mesh) < len(wanted))
         for key, texture in of_mesh.items():
             pictures[key] = _picture(reader, texture, attributes[texture.name], mesh)
         mesh = _apart(mesh)
@@ -116,7 +119,7 @@ def _check_alone(reader: Reader, bsdf: Bsdf, mesh: Mesh, mixed: bool) -> None:
     others = any(not isinstance(texture, MeshAttribute) for texture in bsdf_textures(bsdf))
     if others or mixed:
         reader.unsupported(
-            "a BSDF that shows attributes of a mesh and other textures is not supported",
+            "a shape that shows attributes of a mesh and other textures is not supported",
             hint="make the textures attributes too",
         )
     turned = any(

@@ -13,7 +13,7 @@ from clvol.scene.curves import read_curves
 from clvol.scene.emitter import AreaLight
 from clvol.scene.files import find_parameter
 from clvol.scene.material_facts import has_textures, is_textured
-from clvol.scene.materials import Diffuse, FrontOnly
+from clvol.scene.materials import Bitmap, Checkerboard, Diffuse, FrontOnly
 from clvol.scene.mesh_arrays import read_arrays
 from clvol.scene.mesh_attributes import with_attributes
 from clvol.scene.mesh_files import read_mesh
@@ -151,7 +151,9 @@ def _shape(reader: Reader, kind: str, to_world: np.ndarray, triangles: Mesh | No
             reader.node.where,
         )
     made_of: Bsdf = reader.build(bsdf) if bsdf else Diffuse((0.0,) if emission else (0.5,))
-    made_of, triangles = with_attributes(reader, made_of, triangles)
+    made_of, triangles = with_attributes(
+        reader, made_of, triangles, isinstance(emission, Bitmap | Checkerboard)
+    )
     made = Shape(
         kind,
         to_world,

@@ -175,6 +175,12 @@ def test_shapes_of_one_bsdf_show_what_each_has():
             {"vertex_a": np.ones(4)},
             "attributes of a mesh and other textures is not supported",
         ),
+        (
+            shows("vertex_a"),
+            {"vertex_a": np.ones(4)}
+            | {"emitter": {"type": "area", "radiance": {"type": "bitmap", "bitmap": np.ones((1, 2, 3))}}},
+            "attributes of a mesh and other textures is not supported",
+        ),
         (shows("vertex_a", scale=0.5), {"vertex_a": {"type": "checkerboard"}}, "'scale' of a mesh_attribute"),
         (
             {
