@@ -91,11 +91,12 @@ CASES = {
     "shaft": Case("shaft", SIDES, uninitialised=False),
     "lights and masks": Case("lights and masks", {}, {"majorant": "grid"}),
     "materials": Case("materials", {}),
+    "bends": Case("bends", {}, uninitialised=False),
     "colours, delta": Case("colours", {}, {"technique": "delta", "majorant": "grid"}),
     "colours, spectral": Case(
         "colours", {}, {"technique": "spectral", "majorant": "grid", "probability": "max"}
     ),
-    "flames": Case("flames", {}, {"majorant": "grid", "probability": "average"}),
+    "flames": Case("flames", {}, {"majorant": "grid", "probability": "average"}, uninitialised=False),
     "within": Case("within", {}),
     "far apart": Case("far apart", {}, {"technique": "delta", "majorant": "grid"}),
     "far apart, tree": Case("far apart", {}, {"technique": "spectral", "majorant": "kdtree"}),
@@ -200,7 +201,7 @@ def checked(name: str) -> Counter[Finding]:
         variables = {"PYOPENCL_NO_CACHE": "1", "PYTHONWARNINGS": "ignore", "CLVOL_DEVICE": "Oclgrind"}
         done = subprocess.run(command, env=os.environ | variables, capture_output=True, text=True)
         if done.returncode:
-            fail(f"{name} did not render: {done.stderr.strip().splitlines()[-1]}")
+            fail(f"{name} did not render ({done.returncode}): {done.stderr.strip().splitlines()[-1]}")
         return findings(log.read_text(encoding="utf-8", errors="replace") if log.exists() else "")
 
 

@@ -102,35 +102,37 @@ def box(medium: dict[str, Any], **more: Any) -> dict[str, Any]:
     return {"type": "cube", "to_world": half, "bsdf": {"type": "null"}, "interior": medium} | more
 
 
-def materials() -> clvol.Scene:
-    """A wall of balls, one of each BSDF that scenes/ and the scene above have not."""
-    diffuse = {"type": "diffuse", "reflectance": TEXTURE}
-    bsdfs = [
-        {"type": "conductor", "material": "Au"},
-        {"type": "thindielectric"},
-        {"type": "principled", "base_color": TEXTURE, "roughness": 0.4, "clearcoat": 0.5, "metallic": 0.3},
-        {"type": "principled", "base_color": 0.5, "roughness": 0.3, "spec_trans": 0.8, "eta": 1.4},
-        {"type": "principledthin", "roughness": 0.4, "spec_trans": 0.5, "diff_trans": 0.6},
-        {"type": "roughconductor", "alpha": TEXTURE},
-        {"type": "roughdielectric", "alpha": 0.3},
-        {"type": "blendbsdf", "weight": 0.4, "a": diffuse, "b": {"type": "roughplastic"}},
-        {"type": "bumpmap", "heights": TEXTURE, "nested": diffuse},
-        {"type": "normalmap", "normalmap": TEXTURE, "nested": {"type": "roughplastic"}},
-    ]
-    balls = {
+DIFFUSE = {"type": "diffuse", "reflectance": TEXTURE}
+MATERIALS = [
+    {"type": "conductor", "material": "Au"},
+    {"type": "thindielectric"},
+    {"type": "principled", "base_color": TEXTURE, "roughness": 0.4, "clearcoat": 0.5, "metallic": 0.3},
+    {"type": "principled", "base_color": 0.5, "roughness": 0.3, "spec_trans": 0.8, "eta": 1.4},
+    {"type": "principledthin", "roughness": 0.4, "spec_trans": 0.5, "diff_trans": 0.6},
+    {"type": "twosided", "nested": {"type": "roughconductor", "alpha": TEXTURE}},
+    {"type": "roughdielectric", "alpha": 0.3},
+    {"type": "blendbsdf", "weight": 0.4, "a": DIFFUSE, "b": {"type": "roughplastic"}},
+]
+BENDS = [
+    {"type": "bumpmap", "heights": TEXTURE, "nested": DIFFUSE},
+    {"type": "normalmap", "normalmap": TEXTURE, "nested": {"type": "roughplastic"}},
+]
+
+
+def balls(bsdfs: list[dict[str, Any]]) -> clvol.Scene:
+    """A wall of balls, one of each BSDF."""
+    made = {
         f"ball{n}": {
             "type": "sphere",
-            "center": (0.55 * (n % 4) - 0.825, 0.6 * (n // 4) - 0.6, 0.0),
+            "center": (0.55 * (n % 4) - 0.825, 0.6 * (n // 4) - 0.3, 0.0),
             "radius": 0.33,
-            "bsdf": {"type": "twosided", "nested": bsdf} if bsdf["type"] == "roughconductor" else bsdf,
+            "bsdf": bsdf,
         }
         for n, bsdf in enumerate(bsdfs)
     }
-    sky = {"type": "envmap", "bitmap": PICTURE}
-    integrator = {"type": "path", "max_depth": 6}
-    return clvol.load_dict(
-        {"type": "scene", "integrator": integrator, "sensor": pinhole(), "sky": sky, **balls}
-    )
+    sky, integrator = {"type": "envmap", "bitmap": PICTURE}, {"type": "path", "max_depth": 6}
+    described = {"type": "scene", "integrator": integrator, "sensor": pinhole(), "sky": sky}
+    return clvol.load_dict(described | made)
 
 
 def colours() -> clvol.Scene:
@@ -200,7 +202,8 @@ def far_apart() -> clvol.Scene:
 
 MADE = {
     "lights and masks": lights_and_masks,
-    "materials": materials,
+    "materials": lambda: balls(MATERIALS),
+    "bends": lambda: balls(BENDS),
     "colours": colours,
     "flames": flames,
     "within": within,
