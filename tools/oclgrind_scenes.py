@@ -58,6 +58,13 @@ def lights_and_masks() -> clvol.Scene:
                 "radius": 0.1,
                 "light": {"type": "area", "radiance": 3.0},
             },
+            "panel": {
+                "type": "rectangle",
+                "to_world": clvol.translate((0, 0.5, 1.2))
+                @ clvol.rotate((0, 1, 0), 180.0)
+                @ clvol.scale(0.5),
+                "light": {"type": "area", "radiance": TEXTURE},
+            },
             "floor": {
                 "type": "rectangle",
                 "to_world": clvol.rotate((1, 0, 0), -90.0) @ clvol.scale(2.0),
