@@ -1,19 +1,25 @@
 /* Adds the samples of one finished pass to the film, pixel by pixel in the order of the samples, so that
    the sums have the same bits whatever order the paths ended in.
 
-   Sums are pairs of floats (value and rounding error), 48 bits in all: float32 alone drifts after some
-   ten million samples (METHODS §7). */
+   Sums are pairs of floats (value and rounding error), 48 bits in all: float32 alone drifts (METHODS §7). */
 #include "core/scene.h"
 
 #pragma OPENCL FP_CONTRACT OFF
 
-/* sum += value, error-free (Knuth's two-sum); x: sum, y: what rounding lost. */
+/* The pair whose x is the float nearest to its sum: y stays below the last digit of x, or it would drift itself. */
+INLINE float2 settled(float2 sum)
+{
+    const float total = sum.x + sum.y;
+    return (float2)(total, sum.y - (total - sum.x));
+}
+
+/* sum += value, to 48 bits (Knuth's two-sum); x: sum, y: what rounding lost. */
 INLINE float2 add_exactly(float2 sum, float value)
 {
     const float total = sum.x + value;
     const float part = total - sum.x;
     const float lost = (sum.x - (total - part)) + (value - part);
-    return (float2)(total, sum.y + lost);
+    return settled((float2)(total, sum.y + lost));
 }
 
 #if CLVOL_RANDOMIZATIONS
@@ -39,7 +45,7 @@ INLINE void add_samples(__global const float *values, uint samples, uint first_s
         const float square = x * x;
         sum = add_exactly(sum, x);
         squares = add_exactly(squares, square);
-        squares.y += fma(x, x, -square);
+        squares = settled((float2)(squares.x, squares.y + fma(x, x, -square)));
     }
     vstore2(sum, 0, film);
     vstore2(squares, CLVOL_CHANNELS, film);
