@@ -26,8 +26,8 @@ CASES: tuple[Case, ...] = tuple(itertools.chain.from_iterable(GROUPS.values()))
 ALPHA = 1e-4
 """Probability that any case of a sound renderer is called wrong, in one part of the suite."""
 TURNS = (("regular", "residual-ratio", "kdtree"), ("weighted-decomposition", "ratio", "grid"))
-"""What cases take by turns where each is rendered in one way: few, since kernels take long to build, and none
-that needs bounds that hold."""
+"""What groups take by turns where each case is rendered in one way: few, since kernels take long to build,
+and none that needs bounds that hold."""
 Chosen = Callable[[Case, "Scene"], Iterable[Choices]]
 """In which ways a case is rendered."""
 
@@ -39,8 +39,8 @@ def turn(case: Case, number: int) -> Choices:
 
 
 def in_turn(case: Case, _scene: Scene) -> Iterable[Choices]:
-    """Every case in one way."""
-    return (turn(case, CASES.index(case)),)
+    """Every case in one way, groups by turns: cases of a group share kernels."""
+    return (turn(case, list(GROUPS).index(case.group)),)
 
 
 def every_way(case: Case, scene: Scene) -> Iterable[Choices]:
