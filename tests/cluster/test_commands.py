@@ -1,0 +1,56 @@
+"""`clvol render` on workers of its own."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import clvol
+
+pytest.importorskip("distributed", reason="needs the extra cluster: pip install 'clvol[cluster]'")
+pytestmark = pytest.mark.contract
+COMMAND = [sys.executable, "-m", "clvol", "render"]
+
+
+@pytest.fixture
+def volumes(tmp_path):
+    for n in (1, 2):
+        np.save(tmp_path / f"v.{n:04}.npy", np.random.default_rng(n).random((9, 9, 9), np.float32))
+    return tmp_path
+
+
+def test_frames_go_to_workers_and_have_the_bits_of_a_device(volumes):
+    options = ["--size", "16x16", "--quality", "final", "--sampler", "independent", "--spp", "40"]
+    for name, where in (("a", ["--workers", "2"]), ("b", ["--device", "0,"])):
+        command = [*COMMAND, "v.####.npy", "-o", f"{name}.####.exr", *options, *where]
+        done = subprocess.run(command, cwd=volumes, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+    for n in (1, 2):
+        one, other = (clvol.load_result(volumes / f"{name}.{n:04}.exr") for name in "ab")
+        assert one.image.tobytes() == other.image.tobytes() and one.samples == other.samples
+
+
+def test_ctrl_c_in_a_terminal_reaches_all_processes_and_the_picture_is_kept(volumes):
+    options = ["--size", "16x16", "--spp", "2000000", "--workers", "2", "-v"]
+    command = [*COMMAND, "v.0001.npy", "-o", "a.exr", *options]
+    begun = subprocess.Popen(
+        command,
+        cwd=volumes,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    for line in begun.stderr:
+        if "device:" in line:
+            break
+    time.sleep(1.0)
+    os.killpg(begun.pid, signal.SIGINT)
+    _, said = begun.communicate()
+    assert begun.returncode == 130, said
+    result = clvol.load_result(volumes / "a.exr")
+    assert 0 < result.samples[1] < 2_000_000
