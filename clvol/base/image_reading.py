@@ -69,7 +69,8 @@ def _read(opened: Any, path: str, channels: int | None) -> Stored:
     if spec.depth > 1:
         raise UnreadableError("it has several layers")
     count = min(spec.nchannels, channels or spec.nchannels)
-    size, free = 4 * spec.width * spec.height * count, available_memory()
+    made = 0 if channels == count else channels or 0  # of other channels than were asked for, these are made
+    size, free = 4 * spec.width * spec.height * (count + made), available_memory()
     if free is not None and size > free:
         raise UnreadableError(
             f"it takes {format_bytes(size)} of memory, of which {format_bytes(free)} are free"

@@ -24,11 +24,13 @@ def read_image(path: str, where: str, raw: bool = False) -> np.ndarray:
     """
     try:
         stored = read_stored(path, channels=3)
+        integers = stored.type_name in ("uint8", "uint16")
+        encoded = stored.type_name == "uint8" or (integers and stored.format_name == "png")
+        return _linear_rgb(stored.pixels, encoded and not raw, in_place=True)
     except UnreadableError as error:
         raise SceneError(f"cannot read image '{path}'", where, str(error)) from None
-    integers = stored.type_name in ("uint8", "uint16")
-    encoded = stored.type_name == "uint8" or (integers and stored.format_name == "png")
-    return _linear_rgb(stored.pixels, encoded and not raw, in_place=True)
+    except MemoryError:
+        raise SceneError(f"cannot read image '{path}'", where, "it takes more memory than there is") from None
 
 
 def image_from_array(array: np.ndarray, where: str, raw: bool = False) -> np.ndarray:

@@ -10,6 +10,7 @@ import OpenImageIO as oiio  # noqa: N813
 import pytest
 
 import clvol
+from clvol.base import image_reading
 from clvol.base.image_reading import jpeg_is_whole, read_stored
 from clvol.errors import SceneError
 from clvol.lab.comparison.reference import read_reference
@@ -104,3 +105,29 @@ def test_metadata_of_a_reference_may_be_anything(tmp_path: Path, spp: object) ->
     path.write_bytes(encode_exr(split_channels("", np.ones((SIZE, SIZE, 3))), {"spp": spp, "seeds": "² 4"}))
     found = read_reference(path, FILM)
     assert found.spp is None and found.seeds is None and found.round_spp is None
+
+
+def test_a_picture_of_grey_needs_room_for_its_colours(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    output = oiio.ImageOutput.create(str(tmp_path / "a.jpg"))
+    assert output.open(str(tmp_path / "a.jpg"), oiio.ImageSpec(SIZE, SIZE, 1, "uint8"))
+    assert output.write_image(np.ones((SIZE, SIZE, 1), np.float32)) and output.close()
+    needed = 4 * SIZE * SIZE * 4
+    monkeypatch.setattr(image_reading, "available_memory", lambda: needed)
+    assert read_image(str(tmp_path / "a.jpg"), "here").shape == (SIZE, SIZE, 3)
+    monkeypatch.setattr(image_reading, "available_memory", lambda: needed - 1)
+    with pytest.raises(SceneError, match=r"here: cannot read image .* it takes 4 KiB of memory"):
+        read_image(str(tmp_path / "a.jpg"), "here")
+
+
+def test_a_picture_without_room_is_an_error_with_a_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_given: object, **_options: object) -> None:
+        raise MemoryError
+
+    picture(tmp_path / "a.png", "uint8")
+    monkeypatch.setattr("clvol.scene.image._linear_rgb", full)
+    with pytest.raises(SceneError, match=r"here: cannot read image .* more memory than there is"):
+        read_image(str(tmp_path / "a.png"), "here")
