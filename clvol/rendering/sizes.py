@@ -71,12 +71,12 @@ def render_bytes(plan: Plan, pixels: int, pool: Pool) -> int:
 
 
 def check_volumes(memory: DeviceMemory, prepared: PreparedScene, beside: int) -> None:
-    """DeviceError where the bricks of a scene's volumes have no room beside so many other bytes."""
+    """DeviceError where the bricks of a scene's volumes have no room, but so many other bytes do."""
     plural = "volume" if len(prepared.volumes) == 1 else "volumes"
     need = sum(volume.bricks.brick_count * volume.bricks.channels for volume in prepared.volumes)
     need *= BRICK_SAMPLES * 4
-    room = min(memory.largest, max(memory.room() - beside, 0))
-    if need <= room:
+    room = min(memory.largest, memory.room() - beside)
+    if need <= room or room <= 0:  # where nothing at all has room beside the film, the film's error says so
         return
     sizes = [volume.bricks.size for volume in prepared.volumes]
     fitting = _fitting(prepared, _MARGIN * room)

@@ -262,6 +262,7 @@ def test_options_reach_render_unchanged(scene: str, tmp_path: Path, monkeypatch:
     assert outcome.exit_code == 0, outcome.output
     del seen["progress"]
     assert seen == {
+        "client": None,
         "profile": False,
         "denoise": False,
         "sensor": 0,

@@ -1,17 +1,17 @@
 """Kernels built without optimisation: which renders take them, and that nothing but time depends on it."""
 
 import signal
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import ROOT
 
 import clvol
 from clvol.base.interrupts import interruptible, renew
 from clvol.device import quick
 from clvol.device.side_builds import Launch, Unit
 
-ROOM = Path(clvol.__file__).parents[1] / "scenes/room.xml"
+ROOM = ROOT / "scenes/room.xml"
 UNITS = {"a": Unit("a", ("-w",), (Launch("a", 1, 1),)), "b": Unit("b", ("-w",), (Launch("b", 1, 1),))}
 
 
@@ -78,7 +78,7 @@ def test_bits_are_the_same_and_kernels_change_amid_a_render(pocl, monkeypatch, c
     assert sum("built anew" in record.message for record in caplog.records) == 1
 
 
-def test_signals_are_taken_back():
+def test_signals_are_taken_back(ctrl_c):
     with interruptible() as interrupt:
         interrupt.heed(3)
         signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -54,7 +54,7 @@ def test_both_kinds_of_seconds_are_of_the_same_clock(monkeypatch):
     monkeypatch.setattr(candidates, "make_result", lambda session, *_: session)
     prepared = SimpleNamespace(under=lambda plan: None)
     monkeypatch.setattr(pilots, "prepare", lambda *_: work(3.0, 70.0) or prepared)
-    device = SimpleNamespace(is_cpu=True, info=SimpleNamespace(compute_units=2))
+    device = SimpleNamespace(is_cpu=True, description="a device", info=SimpleNamespace(compute_units=2))
     run = pilots.Pilot(
         device, scene(lumps(), (SKY,)), Choices(), independent_seeds(0, "pilot"), 4, None, None
     )

@@ -165,7 +165,7 @@ def test_a_full_disk_costs_no_picture(tmp_path, monkeypatch, caplog):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_leaves_a_checkpoint_and_the_picture(tmp_path, monkeypatch, number):
+def test_a_signal_leaves_a_checkpoint_and_the_picture(tmp_path, monkeypatch, number, ctrl_c):
     """As Ctrl-C does, and with the status of the signal: cluster schedulers send SIGTERM before they kill."""
     path, pressed = scene_file(tmp_path, 8), []
 

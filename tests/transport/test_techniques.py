@@ -100,14 +100,24 @@ def narrow(medium, **keywords):
     )
 
 
-@pytest.mark.parametrize(("sigma", "radiance"), [(1.3, 2.0), ((2.0, 1.0, 0.2), (1.0, 2.0, 3.0))])
-def test_a_homogeneous_absorbing_emitter_is_its_closed_form(sigma, radiance):
-    """L_e (1 - exp(-sigma L)), from homogeneous media, which need no technique."""
+def absorbing_emitter(sigma, radiance):
+    """What a homogeneous one shows, which needs no technique, and L_e (1 - exp(-sigma L))."""
     medium = homogeneous(sigma, 0.0)
     radiance = tuple(np.atleast_1d(radiance).astype(float))
     medium = Medium(medium.sigma_t, medium.albedo, emission=ConstVolume(radiance))
     answer = np.array(radiance) * -np.expm1(-2.0 * np.atleast_1d(sigma))
-    assert_matches(render(narrow(medium), spp=1 << 18, seed=4), answer, bias=0.006)
+    return render(narrow(medium), spp=1 << 18, seed=4), answer
+
+
+def test_a_grey_homogeneous_absorbing_emitter_has_no_noise():
+    """Every sample is the closed form, and their sum is exact."""
+    result, answer = absorbing_emitter(1.3, 2.0)
+    np.testing.assert_allclose(result.image, np.broadcast_to(answer, result.image.shape), rtol=1e-6)
+    assert not result.variance.any()
+
+
+def test_a_coloured_homogeneous_absorbing_emitter_is_its_closed_form():
+    assert_matches(*absorbing_emitter((2.0, 1.0, 0.2), (1.0, 2.0, 3.0)), bias=0.006)
 
 
 TINTS = {"grey": (1.0,), "coloured": (2.0, 1.0, 0.4)}
