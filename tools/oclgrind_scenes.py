@@ -50,7 +50,11 @@ def lights_and_masks() -> clvol.Scene:
                 "film": {"type": "hdrfilm", "width": 4, "height": 4, "rfilter": {"type": "mitchell"}},
             },
             "sky": {"type": "envmap", "bitmap": PICTURE},
-            "spot": {"type": "spot", "to_world": clvol.look_at((1, 2, 0), (0, 0, 0), (0, 0, 1))},
+            "spot": {
+                "type": "spot",
+                "to_world": clvol.look_at((1, 2, 0), (0, 0, 0), (0, 0, 1)),
+                "texture": {"type": "checkerboard"},
+            },
             "point": {"type": "point", "position": (0.0, 1.5, -1.0)},
             "lamp": {
                 "type": "sphere",

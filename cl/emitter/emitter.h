@@ -46,6 +46,9 @@ INLINE LightSample sample_light(const Scene *scene, float3 from, float pick, flo
 #endif
     if (CLVOL_HAS_SPOT && emitter->kind == EMITTER_SPOT) {
         sample_spot(emitter, from, &light);
+#if CLVOL_HAS_SPOT_TEXTURE
+        project_texture(scene, emitter, &light);
+#endif
         return light;
     }
 #if CLVOL_HAS_SUN

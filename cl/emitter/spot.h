@@ -4,6 +4,10 @@
 #define CLVOL_EMITTER_SPOT_H
 #include "core/scene.h"
 #include "emitter/light_sample.h"
+#if CLVOL_HAS_SPOT_TEXTURE
+#include "core/sampling.h"
+#include "texture/texture.h"
+#endif
 
 /* Share of the intensity that travels along d, a unit vector. */
 INLINE float spot_falloff(__global const Emitter *emitter, float3 d)
@@ -26,5 +30,22 @@ INLINE void sample_spot(__global const Emitter *emitter, float3 from, LightSampl
     light->value = emitter_value(emitter) *
                    (spot_falloff(emitter, -light->direction) / (light->chosen * light->distance * light->distance));
 }
+
+#if CLVOL_HAS_SPOT_TEXTURE
+/* Multiplies a sample of the spot by its texture, which lies on the plane one before it (slide in
+   clvol/tables/textures.py). */
+INLINE void project_texture(const Scene *scene, __global const Emitter *emitter, LightSample *light)
+{
+    if (emitter->first == 0)
+        return;
+    const float3 axis = load_vector(emitter->vector), d = -light->direction;
+    const float along = dot_of(d, axis);
+    if (!(along > 0.0f)) /* dark already */
+        return;
+    const float2 at = (float2)(dot_of(d, to_frame(axis, 1.0f, 0.0f, 0.0f)),
+                               dot_of(d, to_frame(axis, 0.0f, 1.0f, 0.0f)));
+    light->value *= texture_value(scene, emitter->first - 1, at / along);
+}
+#endif
 
 #endif

@@ -91,7 +91,7 @@ EMITTER = _record(
     ("beam_width", "f", 1),  # of a spot, radians; of an area light with a texture: 1 + its number
     ("shape", "i", 1),  # of an area light
     ("area", "f", 1),  # or the solid angle of a sun
-    ("first", "i", 1),  # of a mesh's entries in `light_faces` and `light_cdf`
+    ("first", "i", 1),  # of a mesh's entries in `light_faces` and `light_cdf`; of a spot: 1 + its texture
     ("primitive", "u", 1),  # first primitive of an area light
     ("count", "u", 1),  # of its primitives, which follow each other
 )

@@ -55,6 +55,7 @@ class Features:
     directional: bool = False
     point_lights: bool = False
     spot: bool = False
+    spot_textures: bool = False
     sun: bool = False
     area_meshes: bool = False
     area_spheres: bool = False

@@ -54,6 +54,7 @@ def find_features(scene: records.Scene, found: Boundaries) -> Features:
         **_medium_features(media),
         **_volume_features([v for m in media for v in medium_volumes(m)]),
         **_surface_features(surfaces),
+        **_texture_features(scene, surfaces),
         **_light_features(scene, media, surfaces, lamps),
         passable=any(passes_light(s.bsdf) for s in surfaces)
         or (bool(lamps) and scene.integrator.hide_emitters),
@@ -150,8 +151,7 @@ def _surface_features(surfaces: list[records.Shape]) -> dict[str, Any]:
     """What rays meet beside media."""
     meshes = [mesh_of(s) for s in surfaces if s.kind not in QUADRICS]
     bsdfs = [s.bsdf for s in surfaces]
-    pictures = [s.emission for s in surfaces if is_textured(s.emission)]
-    textures = bool(pictures) or any(bsdf_textures(b) for b in bsdfs)
+    textures = any(bsdf_textures(s.bsdf) or is_textured(s.emission) for s in surfaces)
     return {
         "surfaces": len(surfaces),
         "triangles": bool(meshes),
@@ -160,15 +160,25 @@ def _surface_features(surfaces: list[records.Shape]) -> dict[str, Any]:
         "vertex_uvs": any(m.uvs is not None for m in meshes) and (textures or any(map(_turns, bsdfs))),
         "bsdfs": tuple(sorted(set().union(*(bsdf_kinds(b) for b in bsdfs)))),
         "chromatic_surfaces": not all(map(bsdf_is_grey, bsdfs)),
-        "textures": textures,
-        "bitmaps": any(map(has_bitmaps, bsdfs)) or any(isinstance(p, Bitmap) for p in pictures),
-        "area_textures": bool(pictures),
         "material_tables": any(map(has_tables, bsdfs)),
         "rough_textures": any(map(has_rough_textures, bsdfs)),
         "bumps": any(map(has_bumps, bsdfs)),
         "reflecting": any(map(reflects, bsdfs)),
         "samples_at_surfaces": any(map(samples_lights, bsdfs)),
         "transmissive": any(map(is_transmissive, bsdfs)),
+    }
+
+
+def _texture_features(scene: records.Scene, surfaces: list[records.Shape]) -> dict[str, Any]:
+    """What surfaces and lights have textures."""
+    slides = [e.texture for e in scene.emitters if isinstance(e, records.SpotEmitter) and e.texture]
+    pictures = [s.emission for s in surfaces if is_textured(s.emission)]
+    bsdfs = [s.bsdf for s in surfaces]
+    return {
+        "textures": bool(slides or pictures) or any(map(bsdf_textures, bsdfs)),
+        "bitmaps": any(map(has_bitmaps, bsdfs)) or any(isinstance(p, Bitmap) for p in [*slides, *pictures]),
+        "area_textures": bool(pictures),
+        "spot_textures": bool(slides),
     }
 
 
@@ -238,6 +248,8 @@ def _emitter_is_grey(emitter: records.Emitter) -> bool:
             return len(set(value)) == 1
         case records.SunEmitter(irradiance=value):
             return len(set(value)) == 1
-        case records.PointEmitter(intensity=value) | records.SpotEmitter(intensity=value):
+        case records.PointEmitter(intensity=value):
             return len(set(value)) == 1
+        case records.SpotEmitter(intensity=value, texture=slide):
+            return len(set(value)) == 1 and (slide is None or color_is_grey(slide))
     assert_never(emitter)

@@ -115,6 +115,9 @@ def _light_arrays(prepared: PreparedScene, there: Residence, needed: set[str]) -
     arrays = {"emitters": lights.emitters, "light_faces": lights.faces, "light_cdf": lights.cdf}
     if prepared.surfaces is not None:
         arrays |= _surface_arrays(prepared.surfaces, lights)
+    elif "textures" in needed:
+        materials = material_table([], lights.textures)
+        arrays |= {"textures": materials.textures, "texels": materials.texels}
     if "envmap" in needed:
         [environment] = (e for e in prepared.scene.emitters if isinstance(e, records.EnvmapEmitter))
         arrays |= there.made("envmap", Same(environment), lambda: envmap_arrays(environment))
@@ -128,9 +131,7 @@ def _bounds(majorant: PreparedMajorant) -> np.ndarray:
 
 def _surface_arrays(surfaces: Surfaces, lights: LightTable) -> dict[str, np.ndarray]:
     """What the device knows of surfaces, by argument name; without what no surface has."""
-    materials = material_table(
-        [shape.bsdf for shape in surfaces.shapes], [shape.emission for shape in surfaces.shapes]
-    )
+    materials = material_table([shape.bsdf for shape in surfaces.shapes], lights.textures)
     table = surfaces.table.copy()
     table["front"], table["back"] = materials.sides.T
     table["emitter"] = lights.of_shape

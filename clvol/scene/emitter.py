@@ -111,7 +111,6 @@ def point(reader: Reader) -> PointEmitter:
 def spot(reader: Reader) -> SpotEmitter:
     """The `spot` plugin: a cone of light along local +z, which fades from `beam_width` to `cutoff_angle`."""
     accept_common(reader)
-    reader.refuse("texture", "the spot is the same all round")
     intensity = reader.color("intensity", 1.0, light=True, maximum=MOST_INTENSE)
     cutoff = reader.number("cutoff_angle", 20.0, minimum=0.0, maximum=180.0)
     if cutoff == 0:
@@ -122,7 +121,20 @@ def spot(reader: Reader) -> SpotEmitter:
     to_world = reader.transform()
     if not keeps_angles(to_world):
         reader.fail("to_world of a spot must not stretch or shear it", "to_world", "change cutoff_angle")
-    return SpotEmitter(intensity, to_world, cutoff, beam)
+    return SpotEmitter(intensity, to_world, cutoff, beam, _slide(reader, cutoff))
+
+
+def _slide(reader: Reader, cutoff: float) -> Bitmap | Checkerboard | None:
+    """The texture that a spot projects."""
+    if not reader.has("texture"):
+        return None
+    found = None if reader.is_value("texture") else texture(reader, "texture", 1.0, BRIGHTEST)
+    if type(found) not in (Bitmap, Checkerboard):  # as attributes of meshes are
+        reader.fail("the texture of a spot must be a bitmap or a checkerboard", "texture")
+    if cutoff >= 90:
+        reader.fail("a spot with a texture has a cutoff_angle below 90", "cutoff_angle")
+    assert isinstance(found, Bitmap | Checkerboard)
+    return found
 
 
 def area(reader: Reader) -> AreaLight:

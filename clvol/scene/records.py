@@ -16,7 +16,7 @@ from clvol.scene.films import Film as Film
 from clvol.scene.films import ReconstructionFilter as ReconstructionFilter
 from clvol.scene.films import Sampler as Sampler
 from clvol.scene.kept import Kept
-from clvol.scene.materials import Bsdf, Null, Texture
+from clvol.scene.materials import Bitmap, Bsdf, Checkerboard, Null, Texture
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -341,13 +341,14 @@ class SpotEmitter:
     """Point light along local +z of `to_world`.
 
     It has `intensity` up to `beam_width` off the axis, falling in a straight line with the angle to 0 at
-    `cutoff_angle` (both in degrees).
+    `cutoff_angle` (both in degrees).  A `texture` over the square round the cone multiplies it.
     """
 
     intensity: Spectrum
     to_world: np.ndarray
     cutoff_angle: float = 20.0
     beam_width: float = 15.0
+    texture: Bitmap | Checkerboard | None = None
     name: str = field(default="", compare=False, repr=False)
 
 

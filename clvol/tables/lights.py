@@ -15,10 +15,10 @@ from clvol.scene.primitives import QUADRICS
 from clvol.tables.affine import rotation_3x4
 from clvol.tables.colours import luminance, mean_luminance, rgb
 from clvol.tables.environment import envmap_distribution
-from clvol.tables.textures import lamp_textures, mean_radiance
+from clvol.tables.textures import lamp_textures, mean_radiance, slide
 
 if TYPE_CHECKING:
-    from clvol.scene.materials import Texture
+    from clvol.scene.materials import Bitmap, Checkerboard, Texture
     from clvol.tables.surfaces import Surfaces
 
 RANDOM_STEPS = 2.0**32
@@ -30,6 +30,7 @@ class LightTable(NamedTuple):
 
     emitters : EMITTER records.  faces : uint32 (k,), numbers of triangles.  cdf : float32 (k,).
     of_shape : int32, per shape the number of its emitter, or -1.
+    textures : those of lights, by the numbers that emitters have, from 0 on.
 
     A mesh's emitter has `count` triangles.  Its `count + 1` entries of both arrays begin at its `first`:
     those of `cdf` go from 0 to 1, and the last of `faces` is not used.
@@ -39,6 +40,7 @@ class LightTable(NamedTuple):
     faces: np.ndarray
     cdf: np.ndarray
     of_shape: np.ndarray
+    textures: list[Bitmap | Checkerboard]
 
 
 def emitter_order(scene: records.Scene) -> list[records.Emitter]:
@@ -66,11 +68,15 @@ def light_table(
     emitters = emitter_order(scene)
     shapes = () if surfaces is None else surfaces.shapes
     shining = [(n, shape.emission) for n, shape in enumerate(shapes) if shape.emission is not None]
+    pictures = lamp_textures(emission for _, emission in shining)
     table = np.zeros(len(emitters) + len(shining), layout.EMITTER)
     power = np.zeros(len(table))
     for i, emitter in enumerate(emitters):
         power[i] = _describe_emitter(table[i], emitter, centre, radius)
-    pictures = lamp_textures(emission for _, emission in shining)
+        if isinstance(emitter, records.SpotEmitter) and (picture := slide(emitter)) is not None:
+            pictures.append(picture)
+            table[i]["first"] = len(pictures)
+            power[i] *= float(luminance(mean_radiance(picture)))
     faces, cdf = [np.zeros(0, np.uint32)], [np.zeros(0, np.float32)]
     if surfaces is not None:
         for i, (number, emission) in enumerate(shining, len(emitters)):
@@ -94,7 +100,7 @@ def light_table(
     of_shape = np.full(len(shapes), -1, np.int32)
     lit = np.flatnonzero(table["kind"] == layout.enum("EMITTER", "area"))
     of_shape[table["shape"][lit]] = lit
-    return LightTable(table, np.concatenate(faces), np.concatenate(cdf), of_shape)
+    return LightTable(table, np.concatenate(faces), np.concatenate(cdf), of_shape, pictures)
 
 
 def selection(power: np.ndarray, uniform: float = 0.0) -> tuple[np.ndarray, np.ndarray]:

@@ -20,7 +20,7 @@ from clvol.tables.bends import bend_entries
 from clvol.tables.blends import blend_entries
 from clvol.tables.coat import MIN_ALPHA, coat_table, diffuse_reflectance
 from clvol.tables.colours import rgb
-from clvol.tables.textures import TextureTable, lamp_textures, mean_color
+from clvol.tables.textures import TextureTable, mean_color
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -44,10 +44,10 @@ class MaterialTable:
     sides: np.ndarray
 
 
-def material_table(bsdfs: Sequence[Bsdf], lamps: Sequence[Texture | None] = ()) -> MaterialTable:
+def material_table(bsdfs: Sequence[Bsdf], lamps: Sequence[Bitmap | Checkerboard] = ()) -> MaterialTable:
     """Materials of `bsdfs`, those of a scene's shapes in their order; each object gives its records once.
 
-    `lamps`: what shapes emit, whose textures are the first ones.
+    `lamps`: the textures of lights, which are the first ones.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def material_table(bsdfs: Sequence[Bsdf], lamps: Sequence[Texture | None] = ()) 
         Records nested as the loader never nests them (see `bsdf_sides`).
     """
     textures = TextureTable()
-    for picture in lamp_textures(lamps):
+    for picture in lamps:
         textures.add(picture)
     tables: list[np.ndarray] = []
     numbers: dict[Look, int] = {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,8 @@ from clvol.tables.colours import luminance, rgb
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+    from clvol.scene.records import SpotEmitter
 
 
 def mean_color(texture: Texture) -> float:
@@ -38,8 +41,30 @@ def mean_radiance(texture: Texture) -> np.ndarray:
 
 
 def lamp_textures(emissions: Iterable[Texture | None]) -> list[Bitmap | Checkerboard]:
-    """The textures of lights, each once, in the order in which they come before all others."""
+    """The textures of area lights, each once, in the order in which they come before all others."""
     return list(dict.fromkeys(e for e in emissions if isinstance(e, Bitmap | Checkerboard)))
+
+
+def slide(spot: SpotEmitter) -> Bitmap | Checkerboard | None:
+    """A spot's texture over the plane one before it, in the frame that the device has round its axis."""
+    if spot.texture is None:
+        return None
+    axes = spot.to_world[:3, :3] / np.linalg.norm(spot.to_world[:3, 2])
+    x, y, _ = device_frame(axes[:, 2])
+    to_square = np.eye(3)
+    to_square[:2, :2] = 0.5 / np.tan(np.radians(spot.cutoff_angle)) * axes[:, :2].T @ np.stack([x, y], axis=1)
+    to_square[:2, 2] = 0.5
+    return replace(spot.texture, to_uv=spot.texture.to_uv @ to_square)
+
+
+def device_frame(n: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Orthonormal frame round the unit vector n (Duff et al. 2017), as `to_frame` in cl/core/sampling.h."""
+    n = n.astype(np.float32).astype(np.float64)
+    s = np.copysign(1.0, n[2])
+    a = -1.0 / (s + n[2])
+    b = n[0] * n[1] * a
+    u = np.array([s * n[0] * n[0] * a + 1.0, s * b, -s * n[0]])
+    return u, np.array([b, n[1] * n[1] * a + s, -n[1]]), n
 
 
 class TextureTable:

@@ -363,7 +363,11 @@ PARAMETERS = {
     ),
     "directional": ({}, LIGHT | {"irradiance": RGB, "direction": [1, 2, 3], "to_world": TURNED}),
     "point": ({}, LIGHT | {"intensity": RGB, "position": [1, 2, 3], "to_world": MOVED}),
-    "spot": ({}, LIGHT | {"intensity": RGB, "cutoff_angle": 30.0, "beam_width": 5.0, "to_world": TURNED}),
+    "spot": (
+        {},
+        LIGHT
+        | {"intensity": RGB, "cutoff_angle": 30.0, "beam_width": 5.0, "texture": TEXTURE, "to_world": TURNED},
+    ),
     "sunsky": (
         {},
         LIGHT

@@ -80,7 +80,6 @@ MITSUBAS = {
 }
 REFUSED = {
     ("area", "to_world"): "Mitsuba raises an error too",
-    ("spot", "texture"): "said to be not supported",
 }
 
 

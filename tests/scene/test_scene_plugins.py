@@ -606,8 +606,8 @@ def test_8_bit_envmaps_are_srgb_decoded(tmp_path):
         ({"type": "spot", "beam_width": 21}, "beam_width (21) must not exceed cutoff_angle (20)"),
         ({"type": "spot", "to_world": scale([1, 1, 2])}, "must not stretch"),
         (
-            {"type": "spot", "texture": {"type": "checkerboard"}},
-            "'texture' of emitter 'spot' is not supported",
+            {"type": "spot", "texture": 0.5},
+            "the texture of a spot must be a bitmap or a checkerboard",
         ),
         (
             {"type": "constant", "radiance": {"type": "checkerboard"}},
