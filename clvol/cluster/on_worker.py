@@ -59,7 +59,7 @@ def part_of_range(job: Job, first: int, count: int, seed: int) -> Part:
     """The sums of a range, once it is this task's turn."""
     from distributed import get_worker
 
-    key = get_worker().get_current_task()
+    key = str(get_worker().get_current_task())
 
     def urgency() -> int:
         return max(_levels.get(job.name, 0), _levels.get(key, 0))
