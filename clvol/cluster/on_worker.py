@@ -17,6 +17,8 @@ _turn = threading.Lock()
 """A worker renders one range at a time, with all of its device."""
 _ready: dict[str, Renderer] = {}
 """The renderer of the last job, by the job's name."""
+_LOOKING_SECONDS = 0.05
+"""How often who waits for its turn looks whether it needs one."""
 _levels: dict[str, int] = {}
 """How urgently ends were asked for: of jobs by their names, and of ranges by their keys."""
 
@@ -47,12 +49,16 @@ def _told_from_here(error: Error) -> Error:
 
 
 def about(job: Job) -> About:
-    """What the worker makes of a job."""
-    with _turn:
-        try:
-            return _renderer(job).about()
-        except Error as error:
-            raise _told_from_here(error) from None
+    """What the worker makes of a job; it waits for no range of that job, whose time limit waits for it."""
+    while not _turn.acquire(timeout=_LOOKING_SECONDS):
+        if (ready := _ready.get(job.name)) is not None:
+            return ready.about()
+    try:
+        return _renderer(job).about()
+    except Error as error:
+        raise _told_from_here(error) from None
+    finally:
+        _turn.release()
 
 
 def part_of_range(job: Job, first: int, count: int, seed: int) -> Part:

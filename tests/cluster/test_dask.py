@@ -3,6 +3,7 @@
 import os
 import signal
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -87,6 +88,15 @@ def test_ctrl_c_keeps_the_picture(client, ctrl_c):
 def test_a_time_limit_ends_ranges_early(client):
     result = clvol.render(scene(), client=client, time_limit=0.05, pool=256)
     assert result.samples[1] > 0 and np.isfinite(result.image).all()
+
+
+def test_a_job_is_told_of_while_one_of_its_ranges_renders(monkeypatch):
+    """A time limit counts from there, whichever thread of a worker comes first."""
+    ranges = job.Job(scene(), None, 0, {})
+    ready = SimpleNamespace(about=lambda: "ready")
+    monkeypatch.setattr(on_worker, "_ready", {ranges.name: ready})
+    with on_worker._turn:
+        assert on_worker.about(ranges) == "ready"
 
 
 def test_a_straggler_is_helped_and_counted_once(client, expected, monkeypatch):
