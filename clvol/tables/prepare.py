@@ -16,6 +16,7 @@ from clvol.scene.thinness import check_thinness
 from clvol.tables.apart import channels_apart, depth_across
 from clvol.tables.camera_medium import check_camera_medium
 from clvol.tables.majorants import Majorants, PreparedMajorant, choose_majorants
+from clvol.tables.resolution import check_resolution
 from clvol.tables.surfaces import Surfaces, prepare_surfaces, same_surface, with_looks
 from clvol.tables.volumes import PreparedVolume, check_cover, prepare_volume
 
@@ -139,6 +140,7 @@ class _Kept:
         known = () if before is None else before.volumes
         in_place = before is not None and np.array_equal(before.centre, centre)
         volumes = tuple(_prepared_volume(volume, centre, known, in_place) for volume in matter.volumes)
+        check_resolution(scene, found, centre, radius, matter, volumes)
         surfaces = before.surfaces_of(scene, found) if before is not None and in_place else None
         surfaces = surfaces or prepare_surfaces(scene, found, centre)
         kept = cls(scene.shapes, _others(scene), found, centre, radius, surfaces, matter, volumes)
