@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from clvol.api.extent import check_alone, sample_range
 from clvol.api.rescue import rescued
 from clvol.api.resuming import Before, check_same, checkpoint_of, resumable, what_is_left
-from clvol.api.sharing import is_spread
+from clvol.api.sharing import check_spread, is_spread
 from clvol.base.arguments import check_seed, flag
 from clvol.base.progress import Glance, Progress
 from clvol.cluster.dask import check_client
@@ -28,8 +28,8 @@ from clvol.rendering.checkpoint import is_checkpoint
 from clvol.rendering.outcome import make_result
 from clvol.rendering.profiler import timed
 from clvol.rendering.session import MAX_SAMPLES, Session
-from clvol.scene.records import Scene
-from clvol.scene.views import View, viewed
+from clvol.scene.records import Batch, Scene
+from clvol.scene.views import View, parts_of, viewed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -56,7 +56,8 @@ class Order:
     first, count : samples of each pixel; `spp` is what was given instead.
     transparent : the background was asked to be so.
     denoise : its results get their layer `denoised`.
-    spread : several devices, or workers of a `client`, render it.
+    spread : it is rendered in ranges of samples, that are added: by several devices or workers of a `client`,
+        or by one device where it is several pictures side by side.
     """
 
     scene: Scene
@@ -91,6 +92,8 @@ class Order:
         """
         check_alone(given)
         scene = viewed(check_scene(function, scene), given["sensor"], given["size"], given["background"])
+        if batch := isinstance(scene.sensor, Batch):
+            check_spread(given, batch)
         asked = {family: given[family] for family in registry.FAMILIES}
         transparent = asked["background"] == registry.TRANSPARENT
         if transparent:
@@ -127,7 +130,7 @@ class Order:
             denoise=denoise,
             device=given["device"],
             client=None if given["client"] is None else check_client(given["client"]),
-            spread=is_spread(given),
+            spread=batch or is_spread(given),
             pool=given["pool"],
             resumed=resumed,
             checkpoint=checkpoint,
@@ -136,7 +139,7 @@ class Order:
 
     def planned(self) -> Plan:
         """What is to be done, as far as it is known without a device and a pilot."""
-        plan = Plan.of(self.scene, self.choices)
+        plan = Plan.of(parts_of(self.scene)[0], self.choices)
         if self.denoise and plan.guides_denoiser:
             plan = plan.having(self.choices.but(aov=tuple(dict.fromkeys((*self.choices.aov, *FEATURES)))))
         return plan

@@ -17,7 +17,7 @@ from clvol.planning.choices import NUMBERS, Choices
 from clvol.planning.plan import Plan
 from clvol.rendering.profiler import Profiler, timed
 from clvol.rendering.residence import staying
-from clvol.scene.views import before, viewed
+from clvol.scene.views import before, parts_of, viewed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -84,9 +84,10 @@ def render(  # type: ignore[misc]  # the options of several views are those of o
     spp, seed
         Samples per pixel and 64-bit seed. They default to the scene's.
     sensor
-        Which of the scene's sensors sees it, from 0. The default is the first. Or a dict: a sensor as
-        `load_dict` takes it; or without a "type" what is other than in the scene's sensor, by the names of
-        `traverse`, as ``{"to_world": …}``. Or a list of these: the scene is built once for all views.
+        Which of the scene's sensors sees it, from 0; the numbers after them are those of sensors inside of a
+        batch. The default is the first. Or a dict: a sensor as `load_dict` takes it; or without a "type" what
+        is other than in the scene's sensor, by the names of `traverse`, as ``{"to_world": …}``. Or a list of
+        these: the scene is built once for all views.
     size
         Pixels (width, height) instead of those of the scene's film. The field of view stays along the axis
         that it is given for.
@@ -221,7 +222,8 @@ def plan(scene: Scene, **choices: Any) -> Plan:
     Returns
     -------
     Plan.  Printed it says the choices with their reasons, what the scene was found to use, and what is
-    compiled.  A majorant left at auto is weighed when the volumes are prepared.
+    compiled.  A majorant left at auto is weighed when the volumes are prepared.  Of a batch of sensors it is
+    the first one's.
 
     Raises
     ------
@@ -242,4 +244,4 @@ def plan(scene: Scene, **choices: Any) -> Plan:
         scene, names["background"] = before(scene, registry.TRANSPARENT), "auto"
     for family, name in names.items():
         registry.check_choice(family, name)
-    return Plan.of(scene, Choices.for_scene(scene, names, **choices))
+    return Plan.of(parts_of(scene)[0], Choices.for_scene(scene, names, **choices))

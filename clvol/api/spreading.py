@@ -13,7 +13,7 @@ from clvol.cluster.devices import DeviceWorkers
 from clvol.cluster.job import Job
 from clvol.cluster.spread import Spread
 from clvol.cluster.survey import Need, survey_seed
-from clvol.device.device import open_devices
+from clvol.device.device import names_several, open_device, open_devices
 from clvol.picture.estimate import Replicates
 from clvol.picture.merging import merge
 from clvol.rendering.adaptive import LEAST
@@ -141,7 +141,8 @@ def opened(
     if order.client is not None:
         workers = DaskWorkers(job, order.client)
     else:
-        workers = DeviceWorkers(job, open_devices(order.device))
+        several = names_several(order.device)
+        workers = DeviceWorkers(job, open_devices(order.device) if several else [open_device(order.device)])
     try:
         yield SpreadOrder(order, workers, job)
     finally:

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import threading
+import time
 import uuid
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from clvol.device.device import open_device
 from clvol.errors import RenderError, Told
+from clvol.picture.beside import beside
 from clvol.picture.parts import Part
 from clvol.planning.in_force import warnings
 from clvol.planning.plan import Plan
 from clvol.rendering.doubts import Expected
 from clvol.rendering.outcome import make_result
+from clvol.rendering.residence import staying
 from clvol.rendering.session import Session
+from clvol.scene.digest import scene_digest
+from clvol.scene.views import parts_of
 from clvol.version import __version__
 
 if TYPE_CHECKING:
@@ -69,25 +74,34 @@ class About:
     expected: Expected
 
 
+def seed_of_part(seed: int, number: int) -> int:
+    """Of the picture with that number, of those side by side: the first has the seed itself."""
+    return (seed + number * _PART_SEED) % 2**64
+
+
 class Renderer:
     """A job on one device, ready: one range at a time.
 
-    Opening takes what the scene needs on the device, until the object is gone.
+    Opening takes what the scene needs on the device, until the object is gone.  Pictures that stand side by
+    side have a session each, which share what the scene takes.
     """
 
     def __init__(self, job: Job, device: Device | None = None) -> None:
-        with _opening:  # what is worked out of a scene is kept with it, for all devices
+        with _opening, staying(job.scene):  # what is worked out of a scene is kept with it, for all devices
             self.job, self._begun = job, False
             device = device or open_device(job.device)
-            plan = Plan.of(job.scene, job.choices)
-            self._session = Session.for_plan(device, job.scene, plan, job.seed, job.pool, spp=job.spp)
+            self._sessions = [
+                Session.for_plan(device, one, Plan.of(one, job.choices), job.seed, job.pool, spp=job.spp)
+                for one in parts_of(job.scene)
+            ]
 
     def about(self) -> About:
         """What it does, in words."""
-        session = self._session
-        said = tuple(Told(line) for line in warnings(session.plan, self.job.asked))
-        lines = tuple(session.plan.describe())
-        return About(session.device.description, lines, said, Expected.of(session))
+        session, more = self._sessions[0], len(self._sessions) - 1
+        plans = [one.plan for one in self._sessions]
+        said = dict.fromkeys(Told(line) for plan in plans for line in warnings(plan, self.job.asked))
+        lines = [*session.plan.describe(), *([f"and {more} more pictures beside this one"] if more else [])]
+        return About(session.device.description, tuple(lines), tuple(said), Expected.of(session))
 
     def part(self, first: int, count: int, seed: int, urgency: Callable[[], int]) -> Part:
         """The sums of `count` samples of a seed from `first` on; of fewer where an end is asked for.
@@ -96,18 +110,39 @@ class Renderer:
         """
         if urgency() > (not self._begun):  # at least one is, or there might be no picture
             raise Stopped("was to end before it began")
-        self._begun, session = True, self._session
-        session.restart(seed)
+        self._begun = True
+        for number, session in enumerate(self._sessions):
+            session.restart(seed_of_part(seed, number))
         try:
-            done = session.run(first, count, None, urgency)
+            run = self._side_by_side if len(self._sessions) > 1 else self._sessions[0].run
+            done = run(first, count, None, urgency)
         except (KeyboardInterrupt, RenderError):
             if not urgency():
                 raise
             raise Stopped("was to end before its first samples did") from None
-        part = Part.of(make_result(session, first, done, final=False))
-        session.setup_seconds = session.kernel_seconds = 0.0  # which the first range has
-        session.uploaded = session.built = 0
-        return part
+        parts = [Part.of(make_result(session, first, done, final=False)) for session in self._sessions]
+        for session in self._sessions:
+            session.setup_seconds = session.kernel_seconds = session.earlier = 0.0  # the first range has them
+            session.uploaded = session.built = 0
+        about = {"digest": scene_digest(self.job.scene), "seed": seed}
+        return beside(parts, about) if len(parts) > 1 else parts[0]
+
+    def _side_by_side(self, first: int, count: int, _limit: None, urgency: Callable[[], int]) -> int:
+        """Render as `Session.run` does, every picture the same samples: in rounds, which end together."""
+        done, step = 0, 1
+        while done < count and not (done and urgency()):
+            step, started = min(step, count - done), time.perf_counter()
+            for session in self._sessions:
+                if session.run(first + done, step, None, lambda: 3 if urgency() > 2 else 0) < step:
+                    raise KeyboardInterrupt
+                session.earlier = session.seconds
+            done += step
+            step *= 2 if time.perf_counter() - started < _ROUND_SECONDS / 2 else 1
+        return done
 
 
+_PART_SEED = 0xD1B54A32D192ED03
+"""Between seeds of pictures side by side: their noise is independent."""
+_ROUND_SECONDS = 0.5
+"""About how long all pictures render before the first goes on."""
 _opening = threading.Lock()

@@ -130,7 +130,7 @@ def sum_of(parts: Sequence[Part]) -> Part:
         samples=samples,
         ranges=_joined([span for part in parts for span in part.ranges]),
         aovs={name: _summed_aov(name, parts) for name in parts[0].aovs},
-        stats=_merged_stats([part.stats for part in parts]),
+        stats=merged_stats([part.stats for part in parts]),
         metadata=_merged_metadata([part.metadata for part in parts], samples),
         files=tuple(dict.fromkeys(file for part in parts for file in part.files)),
     )
@@ -189,7 +189,7 @@ def _joined(spans: Sequence[tuple[int, int]]) -> Ranges:
     return tuple(joined)
 
 
-def _merged_stats(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def merged_stats(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Merge dictionaries of statistics, nested ones too; a name only some of them have is kept."""
     names = dict.fromkeys(name for part in parts for name in part)
     merged = {name: _merged_stat(name, [part[name] for part in parts if name in part]) for name in names}
@@ -202,7 +202,7 @@ def _merged_stats(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
 def _merged_stat(name: str, values: Sequence[Any]) -> Any:
     """Merge one statistic: dictionaries by entry, flags by "or", numbers by sum or maximum, others listed."""
     if all(isinstance(value, dict) for value in values):
-        return _merged_stats(values)
+        return merged_stats(values)
     if all(isinstance(value, bool | np.bool_) for value in values):
         return any(values)
     if all(isinstance(value, int | float | np.number) for value in values):

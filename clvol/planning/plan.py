@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from clvol import layout
+from clvol.errors import OptionError
 from clvol.planning.auto import OWN, UNSETTLED, resolve
 from clvol.planning.choices import Choices
 from clvol.planning.compiled import filled_slots, plan_macros
@@ -21,6 +22,7 @@ from clvol.planning.inspection import find_features
 from clvol.planning.refusals import refuse_impossible
 from clvol.planning.settled import THIN
 from clvol.scene.boundaries import Boundaries, find_boundaries
+from clvol.scene.records import Batch
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -44,6 +46,12 @@ class Plan(Decisions):
     @classmethod
     def of(cls, scene: Scene, choices: Choices | None = None) -> Plan:
         """Inspect a scene and plan its render; OptionError for choices that cannot be right."""
+        if isinstance(scene.sensor, Batch):
+            raise OptionError(
+                "a batch is a picture of several sensors, which has no plan of its own",
+                scene.source,
+                "take one of its sensors, whose numbers follow those of the scene's own",
+            )
         found = find_boundaries(scene)
         features, own = find_features(scene, found), scene.integrator.choices
         return cls.for_features(features, choices or Choices(), found, own)

@@ -20,7 +20,7 @@ def scenery_of(prepared: PreparedScene) -> Scenery | None:
 
     There are no labels of what is one pixel.
     """
-    if isinstance(prepared.scene.sensor, Meter):
+    if isinstance(prepared.scene.camera, Meter):
         return None
     volumes = {id(m.sigma_t): m for m in prepared.matter.media if isinstance(m.sigma_t, GridVolume)}
     if len(volumes) != 1:
@@ -28,7 +28,7 @@ def scenery_of(prepared: PreparedScene) -> Scenery | None:
     [medium] = volumes.values()
     volume = medium.sigma_t
     assert isinstance(volume, GridVolume)
-    rays = camera_rays(prepared.scene.sensor, prepared.scene.film, np.zeros(3), np.inf)
+    rays = camera_rays(prepared.scene.camera, prepared.scene.film, np.zeros(3), np.inf)
     linear, offset = volume.index_to_world[:3, :3], volume.index_to_world[:3, 3]
     start, columns = rays.frame
     right = rays.dx if rays.parallel else rays.base_dx

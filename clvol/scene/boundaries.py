@@ -99,7 +99,7 @@ def find_boundaries(scene: records.Scene) -> Boundaries:
                 entries.append(MediumEntry(medium, None, id(medium) not in holders))
     known = {id(entry.medium) for entry in entries}
     around = [shape.interior for shape, does in zip(shapes, divides, strict=True) if not does]
-    for medium in (*around, scene.sensor.medium):
+    for medium in (*around, scene.camera.medium):
         if medium is not None and id(medium) not in known:
             known.add(id(medium))
             entries.append(MediumEntry(medium, None, True))
@@ -201,7 +201,7 @@ def scene_sphere(scene: records.Scene, found: Boundaries) -> tuple[np.ndarray, f
     shapes += [e.shape for e in found.entries if e.shape is not None]
     corners = [corner for s in shapes for corner in shape_bounds(s)]
     if not corners:
-        return scene.sensor.to_world[:3, 3].copy(), 1.0
+        return scene.camera.to_world[:3, 3].copy(), 1.0
     lower, upper = np.min(corners, axis=0), np.max(corners, axis=0)
     return (lower + upper) / 2, float(np.linalg.norm(upper - lower)) / 2
 
@@ -231,7 +231,7 @@ def _replaces(found: Boundaries, holders: dict[int, list[Boundary]], inner: int,
 
 def camera_may_be_inside(scene: records.Scene, found: Boundaries) -> bool:
     """Conservative: whether rays may start within a boundary's bounds."""
-    low, high = _starts_of_rays(scene.sensor, scene.film)
+    low, high = _starts_of_rays(scene.camera, scene.film)
     for boundary in found.boundaries:
         lower, upper = shape_bounds(scene.shapes[boundary.shape])
         if (high >= lower).all() and (low <= upper).all():

@@ -168,7 +168,8 @@ def describe_scene(scene: records.Scene) -> list[str]:
 
 def _scene_lines(scene: records.Scene) -> Iterator[str]:
     film, integrator = scene.film, scene.integrator
-    yield f"camera   {_camera(scene.sensor)}"
+    for camera in scene.sensor.parts if isinstance(scene.sensor, records.Batch) else (scene.sensor,):
+        yield f"camera   {_camera(camera)}"
     crop = f", of them {film.crop[2]} x {film.crop[3]} from {_point(film.crop[:2])}" if film.crop else ""
     rfilter = _filter(film.rfilter)
     yield f"film     {film.width} x {film.height} pixels{crop}, {rfilter} filter, {scene.spp} spp"

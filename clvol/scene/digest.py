@@ -13,7 +13,7 @@ take seconds."""
 
 
 _APART = (
-    *("source", "files", "name", "spp", "seed", "choices", "sensors", "component_format", "kept"),
+    *("source", "files", "name", "names", "spp", "seed", "choices", "sensors", "component_format", "kept"),
     *("approximated", "left_out", "aovs"),  # the records tell
     *("sanitize", "repairs"),  # the samples tell
 )

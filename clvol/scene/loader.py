@@ -255,8 +255,6 @@ def load_sensor(given: Mapping[str, object]) -> tuple[Sensor, set[str]]:
     library, node = Library(root, PLUGINS), root["sensor"]
     if (kind := library.kind_of(node)) != "sensor":
         raise SceneError(f"'{node.type}' is a {kind}, not a sensor", node.where)
-    if node.type == "batch":
-        raise SceneError("a batch is several sensors", node.where, "give one of them")
     inside = (value for _, value in node.parameters() if isinstance(value, Node) and not value.is_value)
     return build_whole(node, library), {library.kind_of(library.resolve(value)) for value in inside}
 
@@ -294,7 +292,7 @@ def _build(root: Node, source: str, grids: Grids | None, faults: Faults, plugins
         raise SceneError(f"expected a scene, got a '{root.type}'", root.where)
     library = Library(root, plugins, grids, faults)
     records = _records(root, library)
-    sensors = _sensors(records["sensor"])
+    sensors = tuple(replace(sensor, name=node.id) for node, sensor in records["sensor"])
     shapes = groups.all_shapes(record for _, record in records["shape"])
     emitters = _emitters(records["emitter"], library)
     chosen = Integrator()
@@ -324,12 +322,6 @@ def _build(root: Node, source: str, grids: Grids | None, faults: Faults, plugins
         approximated=tuple(faults.approximated),
         left_out=tuple(faults.left_out),
     )
-
-
-def _sensors(records: list[tuple[Node, Sensor | tuple[Sensor, ...]]]) -> tuple[Sensor, ...]:
-    """The scene's sensors, those of a batch one by one."""
-    groups_of = [(node, record if isinstance(record, tuple) else (record,)) for node, record in records]
-    return tuple(replace(sensor, name=node.id) for node, several in groups_of for sensor in several)
 
 
 def _records(root: Node, library: Library) -> dict[str, list[tuple[Node, Any]]]:

@@ -79,6 +79,16 @@ def _colour(owner: Any, name: str, maximum: float) -> Parameter:
 
 def _sensor(sensor: records.Sensor, seen: set[int]) -> Found:
     camera, film = sensor.camera, sensor.film
+    if isinstance(camera, records.Batch):
+        part = replace(film, width=max(1, film.width // len(camera.parts)))
+        for number, one in enumerate(camera.parts):
+            yield from _nested(camera.names[number] or f"sensor_{number}", _camera(one, part, seen))
+    else:
+        yield from _camera(camera, film, seen)
+    yield from _film(film)
+
+
+def _camera(camera: records.Camera, film: records.Film, seen: set[int]) -> Found:
     if isinstance(camera, records.Orthographic):
         yield "to_world", _field(camera, "to_world", values.matrix(values.invertible), values.frozen)
     else:
@@ -87,7 +97,6 @@ def _sensor(sensor: records.Sensor, seen: set[int]) -> Found:
         yield from _perspective(camera, film)
     for name in ("near_clip", "far_clip") if not isinstance(camera, records.Meter) else ():
         yield name, _field(camera, name, values.number(0.0, exclusive=True))
-    yield from _film(film)
     if camera.medium is not None:
         yield from _nested("medium", _medium(camera.medium, seen))
 

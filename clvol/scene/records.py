@@ -108,6 +108,22 @@ Camera = Perspective | Orthographic | Meter
 
 
 @dataclass(frozen=True, eq=False)
+class Batch:
+    """Several cameras whose pictures stand side by side on one film, each on as many columns of it.
+
+    Each is rendered as a picture of its own (`clvol.scene.views.parts_of`).  `names`: ids, for parameters.
+    """
+
+    parts: tuple[Camera, ...]
+    names: tuple[str, ...]
+
+    @property
+    def medium(self) -> Medium | None:
+        """One that a camera names, if any does."""
+        return next((part.medium for part in self.parts if part.medium is not None), None)
+
+
+@dataclass(frozen=True, eq=False)
 class ConstVolume:
     """The same value at every point of the unit cube under `to_world` (4x4, local to world)."""
 
@@ -389,9 +405,9 @@ class Integrator:
 
 @dataclass(frozen=True, eq=False)
 class Sensor:
-    """A camera with its film and sampler."""
+    """A camera, or several side by side, with its film and sampler."""
 
-    camera: Camera
+    camera: Camera | Batch
     film: Film
     sampler: Sampler
     name: str = ""
@@ -405,7 +421,7 @@ class Scene:
     `sensors` are all that the scene has, in its order (`clvol.scene.views.seen_by` takes another).
     """
 
-    sensor: Camera
+    sensor: Camera | Batch
     film: Film
     integrator: Integrator
     shapes: tuple[Shape, ...] = ()
@@ -423,6 +439,12 @@ class Scene:
         if not self.sensors:
             only = Sensor(self.sensor, self.film, Sampler(self.spp, self.seed))
             object.__setattr__(self, "sensors", (only,))
+
+    @property
+    def camera(self) -> Camera:
+        """The sensor, of a scene that is seen by one: `Plan.of` refuses others."""
+        assert not isinstance(self.sensor, Batch)
+        return self.sensor
 
     def __repr__(self) -> str:
         picture = f"{self.film.width} x {self.film.height}, {self.spp} spp"

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from clvol.scene.nodes import NAMELESS
 from clvol.scene.reader import BRIGHTEST
 from clvol.scene.records import (
+    Batch,
     Camera,
     Film,
     Meter,
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
 MAX_SIDE = 65536
 MAX_PIXELS = 2**28
 FOV_AXES = ("x", "y", "diagonal", "smaller", "larger")
+BOX = ReconstructionFilter("box", 0.5, 0.0)
+"""Of pictures in which filters make no difference."""
 _FILM_DIAGONAL_MM = float(np.hypot(36.0, 24.0))
 
 
@@ -119,7 +123,7 @@ def _meter(reader: Reader, meter: Meter) -> Sensor:
             next((name for name, _ in reader.children("film")), ""),
             "give its film a width and a height of 1",
         )
-    return replace(sensor, film=replace(sensor.film, rfilter=ReconstructionFilter("box", 0.5, 0.0)))
+    return replace(sensor, film=replace(sensor.film, rfilter=BOX))
 
 
 def _clip(reader: Reader) -> tuple[float, float]:
@@ -131,13 +135,14 @@ def _clip(reader: Reader) -> tuple[float, float]:
     return near, far
 
 
-def _sensor(reader: Reader, camera: Camera) -> Sensor:
+def _sensor(reader: Reader, camera: Camera | Batch) -> Sensor:
     """`camera` with the film and sampler inside the sensor."""
     _shutter(reader)
     film_node, sampler_node = reader.only_child("film"), reader.only_child("sampler")
-    medium = reader.only_child("medium")
+    if not isinstance(camera, Batch) and (medium := reader.only_child("medium")):
+        camera = replace(camera, medium=reader.build(medium))
     return Sensor(
-        replace(camera, medium=reader.build(medium) if medium else None),
+        camera,
         reader.build(film_node) if film_node else Film(),
         reader.build(sampler_node) if sampler_node else Sampler(),
     )
@@ -150,24 +155,38 @@ def _shutter(reader: Reader) -> None:
     reader.refuse("srf", "pictures are linear sRGB")
 
 
-def batch(reader: Reader) -> tuple[Sensor, ...]:
-    """The `batch` plugin: its sensors, each with a part of the film, which Mitsuba sets side by side.
+def batch(reader: Reader) -> Sensor:
+    """The `batch` plugin: its sensors side by side on its film, each on as many columns.
 
-    Their own films and samplers are superseded by those of the batch.
+    Their own films and samplers are superseded by those of the batch, but for fields of view: as in Mitsuba
+    one that is not along x is what it comes to along x on the sensor's own film.
     """
-    _shutter(reader)
-    found: list[Sensor] = [reader.build(node) for _, node in reader.children("sensor")]
-    film_node, sampler_node = reader.only_child("film"), reader.only_child("sampler")
-    film = reader.build(film_node) if film_node else Film()
-    if not found:
+    cameras, names = [], []
+    for key, node in reader.children("sensor"):
+        inside: Sensor = reader.build(node)
+        camera = inside.camera
+        if isinstance(camera, Batch):
+            reader.fail("a batch takes no other batch", key, "put its sensors into this one")
+        if isinstance(camera, Perspective):
+            fov = math.degrees(field_of_view_x(camera, inside.film))
+            camera = replace(camera, fov=fov, fov_axis="x")
+        cameras.append(camera)
+        names.append(node.id or ("" if key.startswith(NAMELESS) else key))
+    if not cameras:
         reader.fail("a batch needs at least one sensor inside")
-    if film.crop or film.width % len(found):
-        what = f"the width of a batch's film, {film.width}, must be a multiple of its {len(found)} sensors"
-        reader.fail("the film of a batch takes no crop window" if film.crop else what)
-    part = replace(film, width=film.width // len(found))
-    sampler = reader.build(sampler_node) if sampler_node else Sampler()
-    reader.approximated(f"{len(found)} sensors, with a picture each (--sensor N)")
-    return tuple(replace(sensor, film=part, sampler=sampler) for sensor in found)
+    made = _sensor(reader, Batch(tuple(cameras), tuple(names)))
+    if fault := batch_fault(made.film, len(cameras)):
+        reader.fail(fault)
+    return made
+
+
+def batch_fault(film: Film, count: int) -> str:
+    """Why `count` pictures cannot stand side by side on a film; "" where they can."""
+    if film.crop:
+        return "the film of a batch takes no crop window"
+    if film.width % count:
+        return f"the width of a batch's film, {film.width}, must be a multiple of its {count} sensors"
+    return ""
 
 
 def _field_of_view(reader: Reader) -> tuple[float, str]:

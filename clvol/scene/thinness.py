@@ -51,7 +51,7 @@ def thin_media(scene: records.Scene, found: Boundaries) -> list[bool]:
     surfaces bound is measured where rays meet them.
     """
     centre, radius = scene_sphere(scene, found)
-    reach = radius + float(np.linalg.norm(scene.sensor.to_world[:3, 3] - centre))
+    reach = radius + float(np.linalg.norm(scene.camera.to_world[:3, 3] - centre))
     return [
         min((widths(box).min() for box in bounding_boxes(entry)), default=np.inf) < THIN * reach
         for entry in found.entries
@@ -76,7 +76,7 @@ def check_thinness(scene: records.Scene, found: Boundaries) -> None:
                     f"make it thicker than {widths(box).min() * LOST / shares.min():.3g}, or everything else "
                     "smaller or evenly placed round it",
                 )
-    eye = scene.sensor.to_world[:3, 3]
+    eye = scene.camera.to_world[:3, 3]
     for boundary in found.boundaries:
         shape = scene.shapes[boundary.shape]
         lower, upper = shape_bounds(shape)

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
-from clvol.errors import OptionError, shown
+from clvol.errors import OptionError, SceneError, shown
 from clvol.scene.loader import load_sensor
 from clvol.scene.parameters import sensor_with
-from clvol.scene.records import Sampler, Sensor
-from clvol.scene.sensor import film_fault
+from clvol.scene.records import Batch, Meter, Sampler, Sensor
+from clvol.scene.sensor import BOX, batch_fault, film_fault
 
 View = int | Mapping[str, Any]
 """A sensor: the number of one that the scene has, or a dict."""
@@ -20,7 +20,7 @@ TRANSPARENT = "transparent"
 """The background of a picture with alpha."""
 
 if TYPE_CHECKING:
-    from clvol.scene.records import Scene, Spectrum
+    from clvol.scene.records import Camera, Film, Scene, Spectrum
 
 
 def viewed(
@@ -39,9 +39,9 @@ def viewed(
 def seen_by(scene: Scene, sensor: View) -> Scene:
     """The scene as a sensor sees it, with that sensor's film, samples and seed.
 
-    sensor : the number of one of its own, from 0; or a dict.  One with a "type" is a sensor as `load_dict`
-        takes it; without a film and a sampler of its own it has the scene's.  One without changes the scene's
-        sensor, by the names of `clvol.traverse`: ``{"to_world": …}``.
+    sensor : the number of one of its own, from 0, as `all_sensors` has them; or a dict.  One with a "type" is
+        a sensor as `load_dict` takes it; without a film and a sampler of its own it has the scene's.  One
+        without changes the scene's sensor, by the names of `clvol.traverse`: ``{"to_world": …}``.
 
     Raises OptionError for a number that none has, and SceneError for a dict that is no sensor.
     """
@@ -50,17 +50,48 @@ def seen_by(scene: Scene, sensor: View) -> Scene:
         return replace(
             scene, sensor=view.camera, film=view.film, spp=view.sampler.spp, seed=view.sampler.seed
         )
-    count = len(scene.sensors)
+    sensors = all_sensors(scene)
     try:
         number = operator.index(sensor)
     except TypeError:
         hint = "give the number of one of the scene's sensors, or a dict"
         raise OptionError(f"sensor must be a number or a dict, not {shown(sensor)}", hint=hint) from None
-    if not 0 <= number < count:
-        have = "one sensor, number 0" if count == 1 else f"{count} sensors, numbered from 0"
+    if not 0 <= number < len(sensors):
+        have = "one sensor, number 0" if len(sensors) == 1 else f"{len(sensors)} sensors, numbered from 0"
         raise OptionError(f"there is no sensor {number}: the scene has {have}", scene.source)
-    view = scene.sensors[number]
+    view = sensors[number]
     return replace(scene, sensor=view.camera, film=view.film, spp=view.sampler.spp, seed=view.sampler.seed)
+
+
+def all_sensors(scene: Scene) -> list[Sensor]:
+    """The sensors of a scene in its order, and after them those inside of a batch, each with its part."""
+    inside = []
+    for sensor in scene.sensors:
+        if isinstance(sensor.camera, Batch):
+            for camera, name in zip(sensor.camera.parts, sensor.camera.names, strict=True):
+                film = _film_of_part(sensor.film, sensor.camera, camera)
+                inside.append(Sensor(camera, film, sensor.sampler, f"{sensor.name}.{name}"))
+    return [*scene.sensors, *inside]
+
+
+def _film_of_part(film: Film, batch: Batch, camera: Camera) -> Film:
+    """What one of several cameras has of a film; SceneError where it cannot be shared evenly."""
+    if fault := batch_fault(film, len(batch.parts)):
+        raise SceneError(fault)
+    part = replace(film, width=film.width // len(batch.parts))
+    return replace(part, rfilter=BOX) if isinstance(camera, Meter) else part
+
+
+def parts_of(scene: Scene) -> list[Scene]:
+    """The pictures that the scene's stands of, from the left: one, or those of a batch.
+
+    Filters reach over no seam: each picture ends there as at the edge of a film.
+    """
+    if not isinstance(scene.sensor, Batch):
+        return [scene]
+    batch = scene.sensor
+    films = [_film_of_part(scene.film, batch, camera) for camera in batch.parts]
+    return [replace(scene, sensor=one, film=film) for one, film in zip(batch.parts, films, strict=True)]
 
 
 def _described(scene: Scene, given: Mapping[str, Any]) -> Sensor:
@@ -85,7 +116,10 @@ def in_size(scene: Scene, size: tuple[int, int]) -> Scene:
     if scene.film.crop is not None:
         hint = "leave the size out, or the crop window in the scene"
         raise OptionError("the film has a crop window, which goes with its own size", scene.source, hint)
-    return replace(scene, film=replace(scene.film, width=width, height=height))
+    film = replace(scene.film, width=width, height=height)
+    if isinstance(scene.sensor, Batch) and (fault := batch_fault(film, len(scene.sensor.parts))):
+        raise OptionError(fault, scene.source)
+    return replace(scene, film=film)
 
 
 def before(scene: Scene, background: str | Spectrum) -> Scene:

@@ -29,7 +29,7 @@ def check_camera_medium(scene: records.Scene, found: Boundaries) -> None:
     So it does for a medium without an end whose light is more than it absorbs.  Warns of light from afar that
     such a medium swallows.
     """
-    named = scene.sensor.medium
+    named = scene.camera.medium
     for entry in found.entries:
         if entry.everywhere and _endless(entry.medium):
             _check_far_light(scene, entry.medium)
@@ -77,7 +77,7 @@ def _check_far_light(scene: records.Scene, medium: records.Medium) -> None:
         return
     what = f"no light of '{names[0]}' gets through medium{_quoted(medium)}, which has no end"
     hint = "bound it by a shape round everything: its interior, with a null BSDF"
-    if medium is scene.sensor.medium:
+    if medium is scene.camera.medium:
         raise SceneError(f"{what}: the sensor is in it, and no shape holds it", scene.source, hint)
     log.warning("%s: it is only ever the exterior of shapes; %s", what, hint)
 
@@ -103,7 +103,7 @@ def _check_glow(scene: records.Scene, medium: records.Medium) -> None:
 
 def _surrounds(scene: records.Scene, found: Boundaries, medium: records.Medium) -> bool:
     """Whether rays through the middle and the corners of the picture all start in the medium."""
-    rays = camera_rays(scene.sensor, scene.film, np.zeros(3), np.inf)
+    rays = camera_rays(scene.camera, scene.film, np.zeros(3), np.inf)
     width, height = scene.film.window[2:]
     pixels = np.array([(0.5, 0.5), (0, 0), (1, 0), (0, 1), (1, 1)]) * (width, height)
     starts = rays.position + pixels[:, :1] * rays.dx + pixels[:, 1:] * rays.dy

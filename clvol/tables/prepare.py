@@ -169,7 +169,7 @@ class _Kept:
 
 
 def _others(scene: Scene) -> tuple[object, ...]:
-    return (scene.sensor, scene.film, *scene.emitters)
+    return (scene.camera, scene.film, *scene.emitters)
 
 
 def _prepared_volume(

@@ -55,6 +55,9 @@ class Subject:
 
     def __post_init__(self) -> None:
         seen = viewed(self.scene, self.sensor)
+        if self.sensor >= len(self.scene.sensors):
+            what = f"the viewer moves sensors of the scene, and sensor {self.sensor} is inside of a batch"
+            raise OptionError(what, self.scene.source, "render it, or add a perspective sensor")
         if not isinstance(seen.sensor, Perspective):
             what = f"the viewer moves perspective cameras, and sensor {self.sensor} is another"
             raise OptionError(what, self.scene.source, "render it, or add a perspective sensor")
@@ -72,7 +75,7 @@ class Subject:
         self._turned = [name.removesuffix("data") + "to_world" for name in self._environments()]
         names = [self._camera, *chain(*self._knobs.values()), *self._turned, *filter(None, [self._sun])]
         self._first = {name: self.parameters[name] for name in names}
-        self.axes = _axes(seen.sensor.to_world)
+        self.axes = _axes(seen.camera.to_world)
 
     def _environments(self) -> Iterable[str]:
         """Pictures of light from infinity: they can be turned."""

@@ -3,6 +3,7 @@
 import os
 import signal
 import time
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,6 +13,7 @@ from signals import press_key
 
 import clvol
 from clvol.cluster import job, on_worker
+from clvol.scene.records import Batch
 
 distributed = pytest.importorskip(
     "distributed", reason="needs the extra cluster: pip install 'clvol[cluster]'"
@@ -57,6 +59,17 @@ def test_workers_share_a_picture_and_its_bits_are_those_of_one_device(client, ex
     assert seen[-1].noise == result.noise and result.metadata["seconds"] > 0
     further = clvol.render(scene(), client=client, resume=result, **OPTIONS | {"spp": 44})
     assert further.ranges == ((0, 44),)
+
+
+def test_sensors_side_by_side_are_in_each_range(client):
+    seen = scene()
+    several = replace(
+        seen, sensor=Batch((seen.sensor, seen.sensor), ("a", "b")), film=replace(seen.film, width=16)
+    )
+    options = OPTIONS | {"spp": 12}
+    result = clvol.render(several, client=client, **options)
+    assert_same(result, clvol.render(several, **options))
+    assert result.image.shape == (8, 16, 3)
 
 
 def test_frames_come_while_workers_render_and_an_end_is_kept(client):

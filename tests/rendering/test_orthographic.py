@@ -144,25 +144,3 @@ def test_labels_and_rays_know_where_a_volume_is():
     place = clvol.trace_ray(scene, 2, 0, seed=1).place
     assert place.length == pytest.approx(1)
     assert place.distance == pytest.approx(4)
-
-
-def test_a_batch_is_its_sensors_with_a_part_of_its_film_each():
-    film = {"type": "hdrfilm", "width": 6, "height": 2}
-    inner = {"type": "perspective", "fov": 40, "film": {"type": "hdrfilm", "width": 9}}
-    cameras = {"one": inner, "two": {"type": "orthographic"}}
-    sampler = {"type": "independent", "sample_count": 9}
-    batch = {"type": "batch", "film": film, "sampler": sampler} | cameras
-    scene = load_dict({"type": "scene", "camera": batch})
-    assert [type(sensor.camera).__name__ for sensor in scene.sensors] == ["Perspective", "Orthographic"]
-    assert {(s.film.width, s.film.height, s.sampler.spp) for s in scene.sensors} == {(3, 2, 9)}
-    assert "taken as 2 sensors" in scene.approximated[0]
-    assert isinstance(seen_by(scene, 1).sensor, Orthographic)
-    for broken, message in (
-        ({"type": "batch"}, "at least one sensor"),
-        (batch | {"film": film | {"width": 5}}, "multiple of its 2 sensors"),
-        (batch | {"film": film | {"crop_width": 2}}, "no crop window"),
-    ):
-        with pytest.raises(SceneError, match=message):
-            load_dict({"type": "scene", "camera": broken})
-    with pytest.raises(SceneError, match="give one of them"):
-        seen_by(scene, batch)

@@ -44,6 +44,7 @@ PICTURES = {
     "lamps": ("lamps", {}, 64, 2048),
     "fog": ("fog", {}, 96, 4096),
     "cloud": ("cloud", {}, 24, 1024),
+    "batch": ("batch", {}, 32, 1024),
     "bodies": ("bodies", {}, 48, 768),
     "passages": ("passages", {}, 16, 512),
     "passages, depth 1": ("passages", {"depth": 1, "rfilter": "lanczos"}, 32, 4096),
@@ -163,7 +164,7 @@ def test_the_scenes_have_every_plugin_that_both_programs_know():
     used = set(re.findall(r'(?:type|name="integrator" value)="(\w+)"', text))
     used |= {"distant", "radiancemeter"}  # $meter
     used |= {value for _, defaults, *_ in PICTURES.values() for value in defaults.values()}
-    taken_as_others = {*integrator.OTHERS, *integrator.WRAPPERS, *sensor.OTHER_SAMPLERS, "aov", "batch"}
+    taken_as_others = {*integrator.OTHERS, *integrator.WRAPPERS, *sensor.OTHER_SAMPLERS, "aov"}
     known = {name for plugins in PLUGINS.values() for name in plugins}
     not_in_rgb = {"regular", "irregular", "blackbody"}  # Mitsuba's rgb variants do not take them
     at_another_time = {"timed_sunsky"}  # Mitsuba's rays that leave the scene see its first moment

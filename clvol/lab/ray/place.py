@@ -105,8 +105,8 @@ def find_places(kernels: RayKernels, x: int, y: int) -> list[Place]:
 def _camera_rays(prepared: PreparedScene) -> CameraRays:
     everywhere = any(entry.everywhere for entry in prepared.boundaries.entries)
     scene = prepared.scene
-    reach = reach_of(scene.sensor, prepared.radius, everywhere)
-    return camera_rays(scene.sensor, scene.film, prepared.centre, reach)
+    reach = reach_of(scene.camera, prepared.radius, everywhere)
+    return camera_rays(scene.camera, scene.film, prepared.centre, reach)
 
 
 def _segments(prepared: PreparedScene, hits: np.ndarray, spans: np.ndarray, far: float) -> Iterator[_Segment]:
