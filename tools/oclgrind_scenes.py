@@ -55,6 +55,12 @@ def lights_and_masks() -> clvol.Scene:
                 "to_world": clvol.look_at((1, 2, 0), (0, 0, 0), (0, 0, 1)),
                 "texture": {"type": "checkerboard"},
             },
+            "slide": {
+                "type": "projector",
+                "fov": 40.0,
+                "to_world": clvol.look_at((-1, 2, 0), (0, 0, 0), (0, 0, 1)),
+                "irradiance": TEXTURE,
+            },
             "point": {"type": "point", "position": (0.0, 1.5, -1.0)},
             "lamp": {
                 "type": "sphere",

@@ -7,6 +7,7 @@
 #include "emitter/choice.h"
 #include "emitter/envmap.h"
 #include "emitter/light_sample.h"
+#include "emitter/projector.h"
 #include "emitter/spot.h"
 #include "emitter/sun.h"
 
@@ -51,6 +52,12 @@ INLINE LightSample sample_light(const Scene *scene, float3 from, float pick, flo
 #endif
         return light;
     }
+#if CLVOL_HAS_PROJECTOR
+    if (emitter->kind == EMITTER_PROJECTOR) {
+        sample_projector(scene, emitter, from, &light);
+        return light;
+    }
+#endif
 #if CLVOL_HAS_SUN
     if (emitter->kind == EMITTER_SUN) {
         sample_sun(emitter, u, v, &light);

@@ -3,6 +3,7 @@
 #define CLVOL_EMITTER_IRRADIANCE_H
 #include "core/scene.h"
 #include "emitter/light_sample.h"
+#include "emitter/projector.h"
 #include "emitter/spot.h"
 
 /* Lights that a point tells apart, the strongest: the first and those that come last. */
@@ -59,6 +60,11 @@ INLINE float light_irradiance(__global const Emitter *emitter, float3 p)
     float distance;
     const float3 d = light_middle(emitter, p, &distance);
     const float square = distance * distance;
+#if CLVOL_HAS_PROJECTOR
+    float2 uv;
+    if (emitter->kind == EMITTER_PROJECTOR)
+        return value * projector_share(emitter, -d, &uv) / square;
+#endif
     if (emitter->kind == EMITTER_SPOT)
         return value * spot_falloff(emitter, -d) / square;
     if (emitter->kind == EMITTER_POINT)

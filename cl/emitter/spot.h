@@ -5,7 +5,7 @@
 #include "core/scene.h"
 #include "emitter/light_sample.h"
 #if CLVOL_HAS_SPOT_TEXTURE
-#include "core/sampling.h"
+#include "emitter/slide.h"
 #include "texture/texture.h"
 #endif
 
@@ -38,13 +38,9 @@ INLINE void project_texture(const Scene *scene, __global const Emitter *emitter,
 {
     if (emitter->first == 0)
         return;
-    const float3 axis = load_vector(emitter->vector), d = -light->direction;
-    const float along = dot_of(d, axis);
-    if (!(along > 0.0f)) /* dark already */
-        return;
-    const float2 at = (float2)(dot_of(d, to_frame(axis, 1.0f, 0.0f, 0.0f)),
-                               dot_of(d, to_frame(axis, 0.0f, 1.0f, 0.0f)));
-    light->value *= texture_value(scene, emitter->first - 1, at / along);
+    const float along = -dot_of(light->direction, load_vector(emitter->vector));
+    if (along > 0.0f) /* else it is dark already */
+        light->value *= texture_value(scene, emitter->first - 1, slide_point(emitter, -light->direction, along));
 }
 #endif
 

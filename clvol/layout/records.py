@@ -85,13 +85,13 @@ EMITTER = _record(
     ("select_pdf", "f", 1),  # probability that next-event estimation picks it
     ("cdf", "f", 1),  # of picking it or one from number 1 on that comes before; of number 0: 1
     ("value", "f", 3),  # radiance, irradiance or intensity
-    ("vector", "f", 3),  # direction of travel, a spot's axis, or the mean normal of an area light
-    ("position", "f", 3),  # of a point or spot, or the middle of an area light; up where a horizon cuts a sun
-    ("cutoff_angle", "f", 1),  # of a spot, radians
-    ("beam_width", "f", 1),  # of a spot, radians; of an area light with a texture: 1 + its number
+    ("vector", "f", 3),  # direction of travel, axis of a spot or projector, an area light's mean normal
+    ("position", "f", 3),  # of a point of light, or an area light's middle; up where a horizon cuts a sun
+    ("cutoff_angle", "f", 1),  # of a spot, radians; of a projector: `projector_frame` in clvol/tables
+    ("beam_width", "f", 1),  # as that; of an area light with a texture: 1 + its number
     ("shape", "i", 1),  # of an area light
-    ("area", "f", 1),  # or the solid angle of a sun
-    ("first", "i", 1),  # of a mesh's entries in `light_faces` and `light_cdf`; of a spot: 1 + its texture
+    ("area", "f", 1),  # or the solid angle of a sun, or of a projector: `projector_frame`
+    ("first", "i", 1),  # of a mesh's entries in `light_faces` and `light_cdf`; else 1 + its texture
     ("primitive", "u", 1),  # first primitive of an area light
     ("count", "u", 1),  # of its primitives, which follow each other
 )
@@ -218,7 +218,7 @@ ENUMS = {
     "SHAPE": ("NONE", "CUBE", "SPHERE"),
     "PHASE": ("ISOTROPIC", "HG", "RAYLEIGH", "TABPHASE"),
     "TRANSFER": ("SIGMA_T", "ALBEDO", "EMISSION"),  # in the order of a medium's entries
-    "EMITTER": ("CONSTANT", "ENVMAP", "DIRECTIONAL", "POINT", "SPOT", "AREA", "SUN"),
+    "EMITTER": ("CONSTANT", "ENVMAP", "DIRECTIONAL", "POINT", "SPOT", "AREA", "SUN", "PROJECTOR"),
     "SURFACE": ("MESH", "SPHERE", "DISK", "CYLINDER"),
     "QUADRIC": ("SPHERE", "DISK", "CYLINDER"),
     "MATERIAL": BSDFS,

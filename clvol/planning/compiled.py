@@ -64,6 +64,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_HAS_POINT": int(f.point_lights),
         "CLVOL_HAS_SPOT": int(f.spot),
         "CLVOL_HAS_SPOT_TEXTURE": int(f.spot_textures),
+        "CLVOL_HAS_PROJECTOR": int(f.projector),
         "CLVOL_HAS_SUN": int(f.sun),
         "CLVOL_HAS_AREA": int(f.area),
         "CLVOL_HAS_AREA_MESH": int(f.area_meshes),

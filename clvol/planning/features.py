@@ -9,6 +9,7 @@ SAMPLED_LIGHTS = {
     "directional": "directional",
     "point_lights": "points",
     "spot": "spots",
+    "projector": "projectors",
     "sun": "a sun",
     "area": "area lights",
 }
@@ -56,6 +57,7 @@ class Features:
     point_lights: bool = False
     spot: bool = False
     spot_textures: bool = False
+    projector: bool = False
     sun: bool = False
     area_meshes: bool = False
     area_spheres: bool = False
@@ -112,12 +114,17 @@ class Features:
         same everywhere.
         """
         closed = "HG" in self.phases and "TABPHASE" not in self.phases and not self.varied_phases
-        return closed and (self.directional or self.point_lights or self.spot)
+        return closed and (self.directional or self.lit_by_points)
+
+    @property
+    def lit_by_points(self) -> bool:
+        """Lights that are points, which no path meets."""
+        return self.point_lights or self.spot or self.projector
 
     @property
     def near_lights(self) -> bool:
         """Lights at a finite distance."""
-        return self.point_lights or self.spot or self.area
+        return self.lit_by_points or self.area
 
     @property
     def segments(self) -> bool:

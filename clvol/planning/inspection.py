@@ -172,12 +172,13 @@ def _surface_features(surfaces: list[records.Shape]) -> dict[str, Any]:
 def _texture_features(scene: records.Scene, surfaces: list[records.Shape]) -> dict[str, Any]:
     """What surfaces and lights have textures."""
     slides = [e.texture for e in scene.emitters if isinstance(e, records.SpotEmitter) and e.texture]
-    pictures = [s.emission for s in surfaces if is_textured(s.emission)]
+    thrown = [e.texture for e in scene.emitters if isinstance(e, records.ProjectorEmitter) and e.texture]
+    pictures = [*slides, *thrown, *(s.emission for s in surfaces if is_textured(s.emission))]
     bsdfs = [s.bsdf for s in surfaces]
     return {
-        "textures": bool(slides or pictures) or any(map(bsdf_textures, bsdfs)),
-        "bitmaps": any(map(has_bitmaps, bsdfs)) or any(isinstance(p, Bitmap) for p in [*slides, *pictures]),
-        "area_textures": bool(pictures),
+        "textures": bool(pictures) or any(map(bsdf_textures, bsdfs)),
+        "bitmaps": any(map(has_bitmaps, bsdfs)) or any(isinstance(p, Bitmap) for p in pictures),
+        "area_textures": any(is_textured(s.emission) for s in surfaces),
         "spot_textures": bool(slides),
     }
 
@@ -230,6 +231,8 @@ def _emitter_kind(emitter: records.Emitter) -> str:
             return "point_lights"
         case records.SpotEmitter():
             return "spot"
+        case records.ProjectorEmitter():
+            return "projector"
         case records.SunEmitter():
             return "sun"
     assert_never(emitter)
@@ -252,4 +255,6 @@ def _emitter_is_grey(emitter: records.Emitter) -> bool:
             return len(set(value)) == 1
         case records.SpotEmitter(intensity=value, texture=slide):
             return len(set(value)) == 1 and (slide is None or color_is_grey(slide))
+        case records.ProjectorEmitter(irradiance=picture):
+            return color_is_grey(picture)
     assert_never(emitter)

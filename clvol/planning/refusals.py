@@ -18,9 +18,9 @@ def refuse_impossible(features: Features, choices: Choices, chosen: Mapping[str,
     """Raise OptionError for a combination that cannot be right, saying why and what to use."""
     technique, transmittance = chosen["technique"], chosen["transmittance"]
     tracker, estimator = registry.TECHNIQUES[technique], registry.TRANSMITTANCES[transmittance]
-    if transmittance == "none" and (features.directional or features.point_lights or features.spot):
+    if transmittance == "none" and (features.directional or features.lit_by_points):
         raise OptionError(
-            "transmittance 'none' cannot render point, spot and directional lights",
+            "transmittance 'none' cannot render point, spot and directional lights, nor projectors",
             hint="only next-event estimation reaches them: use ratio",
         )
     marches = features.heterogeneous and (tracker.biased or estimator.biased)

@@ -327,6 +327,13 @@ def _emitter(emitter: records.Emitter) -> str:
                 f"spot, intensity {_spectrum(emitter.intensity)}, at {_point(position)}, along "
                 f"{_point(axis / np.linalg.norm(axis))}, to {_number(emitter.cutoff_angle)} degrees"
             )
+        case records.ProjectorEmitter():
+            position, axis = emitter.to_world[:3, 3], emitter.to_world[:3, 2]
+            return (
+                f"projector, irradiance {_radiance(emitter.irradiance)} times {_number(emitter.scale)}, at "
+                f"{_point(position)}, along {_point(axis / np.linalg.norm(axis))}, "
+                f"{_number(emitter.x_fov)} degrees wide"
+            )
         case records.SunEmitter():
             return (
                 f"sun, irradiance {_spectrum(emitter.irradiance)}, towards "

@@ -16,13 +16,19 @@ from clvol.scene.records import (
     DirectionalEmitter,
     EnvmapEmitter,
     PointEmitter,
+    ProjectorEmitter,
+    Spectrum,
     SpotEmitter,
 )
+from clvol.scene.sensor import field_of_view, x_field_of_view
 from clvol.scene.texture import texture
 from clvol.scene.transforms import keeps_angles
 
 MOST_INTENSE = 1e30
 """Largest intensity of a light that is a point, which may be far away: the Sun's is 3e25 W/sr."""
+
+LARGEST_SCALE = 1e14
+"""Of a projector, times `BRIGHTEST` and pi below `MOST_INTENSE`."""
 
 NEGLIGIBLE = 1e-5
 """Share of the brightest value down to which negative values are rounding (colours out of the gamut)."""
@@ -137,15 +143,34 @@ def _slide(reader: Reader, cutoff: float) -> Bitmap | Checkerboard | None:
     return found
 
 
+def projector(reader: Reader) -> ProjectorEmitter:
+    """The `projector` plugin: a perspective camera backwards, whose picture is `irradiance` times `scale`."""
+    accept_common(reader)
+    irradiance = _colour_or_picture(reader, "irradiance")
+    scale = reader.number("scale", 1.0, minimum=0.0, maximum=LARGEST_SCALE)
+    rows, columns = irradiance.pixels.shape[:2] if isinstance(irradiance, Bitmap) else (1, 1)
+    x_fov = x_field_of_view(*field_of_view(reader), columns / rows)
+    to_world = reader.transform()
+    if not keeps_angles(to_world):
+        reader.fail("to_world of a projector must not stretch or shear it", "to_world", "change fov")
+    return ProjectorEmitter(irradiance, scale, to_world, float(np.degrees(x_fov)))
+
+
 def area(reader: Reader) -> AreaLight:
     """The `area` plugin, which makes the shape round it a light: of one radiance, or of a texture of them."""
     accept_common(reader)
-    if reader.is_value("radiance"):
-        return AreaLight(reader.color("radiance", 1.0, light=True, maximum=BRIGHTEST))
-    found = texture(reader, "radiance", 1.0, BRIGHTEST)
+    return AreaLight(_colour_or_picture(reader, "radiance"))
+
+
+def _colour_or_picture(reader: Reader, name: str) -> Spectrum | Bitmap | Checkerboard:
+    """What a light is everywhere, or over (u, v)."""
+    if reader.is_value(name):
+        return reader.color(name, 1.0, light=True, maximum=BRIGHTEST)
+    found = texture(reader, name, 1.0, BRIGHTEST)
     if type(found) not in (Bitmap, Checkerboard):  # as attributes of meshes are
-        reader.refuse_plugin("radiance", "a number, an rgb, a spectrum, a bitmap or a checkerboard")
-    return AreaLight(found)
+        reader.refuse_plugin(name, "a number, an rgb, a spectrum, a bitmap or a checkerboard")
+    assert isinstance(found, Bitmap | Checkerboard)
+    return found
 
 
 def directionalarea(reader: Reader) -> AreaLight:

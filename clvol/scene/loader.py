@@ -127,6 +127,7 @@ PLUGINS: PluginTable = {
         "directional": emitter.directional,
         "point": emitter.point,
         "spot": emitter.spot,
+        "projector": emitter.projector,
         "area": emitter.area,
         "directionalarea": emitter.directionalarea,
         "sunsky": sunsky.sunsky,

@@ -309,6 +309,19 @@ def _emitter(emitter: records.Emitter, _seen: set[int]) -> Found:
             for name in ("cutoff_angle", "beam_width"):
                 yield name, _field(emitter, name, values.number(0.0, 180.0))
             yield "to_world", _field(emitter, "to_world", values.matrix(values.unstretched), values.frozen)
+        case records.ProjectorEmitter():
+            yield from _projector(emitter)
+
+
+def _projector(emitter: records.ProjectorEmitter) -> Found:
+    picture = emitter.irradiance
+    if isinstance(picture, tuple):
+        yield "irradiance.value", _colour(emitter, "irradiance", values.BRIGHTEST)
+    elif isinstance(picture, materials.Bitmap):
+        yield "irradiance.data", _field(picture, "pixels", values.bright_texels, values.frozen)
+    yield "scale", _field(emitter, "scale", values.number(0.0, values.LARGEST_SCALE))
+    yield "x_fov", _field(emitter, "x_fov", values.number(0.0, 180.0, exclusive=True))
+    yield "to_world", _field(emitter, "to_world", values.matrix(values.unstretched), values.frozen)
 
 
 _DESCRIBE: dict[str, Callable[[Any, set[int]], Found]] = {

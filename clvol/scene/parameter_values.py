@@ -12,7 +12,7 @@ import numpy as np
 from clvol.base.masks import as_array, masked_count
 from clvol.errors import SceneError, shown
 from clvol.scene import records
-from clvol.scene.emitter import MOST_INTENSE, check_radiance
+from clvol.scene.emitter import LARGEST_SCALE, MOST_INTENSE, check_radiance
 from clvol.scene.image import image_from_array
 from clvol.scene.medium_facts import channels_of
 from clvol.scene.reader import BRIGHTEST, ROUNDING, range_in_words
@@ -26,7 +26,7 @@ from clvol.volumes import check_coefficients, check_finite, dense_from_array
 from clvol.volumes.grid import DenseGrid
 from clvol.volumes.transfer import Transfer, transfer_of_points
 
-__all__ = ["BRIGHTEST", "MOST_INTENSE"]
+__all__ = ["BRIGHTEST", "LARGEST_SCALE", "MOST_INTENSE"]
 
 Check = Callable[[Any, str], Any]
 """A user's value and the parameter's name to what a record holds; SceneError or VolumeError at the name."""
@@ -175,7 +175,7 @@ def invertible(matrix: np.ndarray) -> str:
 
 
 def unstretched(matrix: np.ndarray) -> str:
-    """The transform of an environment or a spot."""
+    """The transform of an environment, a spot or a projector."""
     return "" if keeps_angles(matrix) else "must not stretch or shear"
 
 
@@ -266,12 +266,17 @@ def environment(value: Any, name: str) -> np.ndarray:
     return frozen(radiance)
 
 
-def texels(value: Any, name: str) -> np.ndarray:
-    """The texels of a bitmap, (height, width, 3), linear, from 0 to 1."""
+def texels(value: Any, name: str, maximum: float = 1.0) -> np.ndarray:
+    """The texels of a bitmap, (height, width, 3), linear, from 0 to `maximum`."""
     pixels = image_from_array(_array(value, name), name, raw=True)
-    if fault := check_texels(pixels):
+    if fault := check_texels(pixels, maximum):
         raise SceneError(fault, name)
     return frozen(pixels)
+
+
+def bright_texels(value: Any, name: str) -> np.ndarray:
+    """The texels of a light's bitmap."""
+    return texels(value, name, BRIGHTEST)
 
 
 def check_together(record: Any, name: str) -> None:

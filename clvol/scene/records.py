@@ -368,6 +368,33 @@ class SpotEmitter:
     name: str = field(default="", compare=False, repr=False)
 
 
+@dataclass(frozen=True, eq=False)
+class ProjectorEmitter:
+    """Point light that throws a picture along local +z of `to_world`, local +x to the picture's left.
+
+    On the plane at a distance of one (local units) across the axis, the picture is `x_fov` degrees wide, and
+    brings pi · scale · `irradiance` all over.  It is as high as the texture's pixels say, else a square.
+    """
+
+    irradiance: Spectrum | Bitmap | Checkerboard
+    scale: float
+    to_world: np.ndarray
+    x_fov: float
+    name: str = field(default="", compare=False, repr=False)
+
+    @property
+    def texture(self) -> Bitmap | Checkerboard | None:
+        """Its picture, where it is no single colour."""
+        return None if isinstance(self.irradiance, tuple) else self.irradiance
+
+    @property
+    def half_sides(self) -> tuple[float, float]:
+        """Half the width and height of the picture at a distance of one."""
+        width = float(np.tan(np.radians(self.x_fov) / 2))
+        rows, columns = self.irradiance.pixels.shape[:2] if isinstance(self.irradiance, Bitmap) else (1, 1)
+        return width, width * rows / columns
+
+
 @dataclass(frozen=True)
 class SunEmitter:
     """Far disk of even radiance, in front of an environment, which a scene with a sun has.
@@ -388,7 +415,15 @@ class SunEmitter:
         return float(4 * np.pi * np.sin(np.radians(self.aperture / 4)) ** 2)
 
 
-Emitter = ConstantEmitter | EnvmapEmitter | DirectionalEmitter | PointEmitter | SpotEmitter | SunEmitter
+Emitter = (
+    ConstantEmitter
+    | EnvmapEmitter
+    | DirectionalEmitter
+    | PointEmitter
+    | SpotEmitter
+    | ProjectorEmitter
+    | SunEmitter
+)
 """Lights that are no surface; area lights are shapes with an `emission`."""
 
 

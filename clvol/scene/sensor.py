@@ -58,7 +58,7 @@ def thinlens(reader: Reader) -> Sensor:
 
 def _pinhole(reader: Reader) -> Perspective:
     """What every perspective camera has: its place, field of view, near and far plane."""
-    fov, fov_axis = _field_of_view(reader)
+    fov, fov_axis = field_of_view(reader)
     return Perspective(_rigid(reader), fov, fov_axis, *_clip(reader))
 
 
@@ -189,7 +189,7 @@ def batch_fault(film: Film, count: int) -> str:
     return ""
 
 
-def _field_of_view(reader: Reader) -> tuple[float, str]:
+def field_of_view(reader: Reader) -> tuple[float, str]:
     """(degrees, axis) from `fov` and `fov_axis`, or from a focal length."""
     if reader.has("fov"):
         if reader.has("focal_length"):
@@ -225,13 +225,16 @@ def is_rigid(matrix: np.ndarray) -> bool:
 
 def field_of_view_x(sensor: Perspective, film: Film) -> float:
     """Horizontal field of view in radians, from a field of view along any axis."""
-    aspect = film.width / film.height
-    axis = sensor.fov_axis
+    return x_field_of_view(sensor.fov, sensor.fov_axis, film.width / film.height)
+
+
+def x_field_of_view(fov: float, axis: str, aspect: float) -> float:
+    """As `field_of_view_x`, of a picture `aspect` times as wide as high; `fov` in degrees along `axis`."""
     if axis == "smaller":
-        axis = "x" if film.width <= film.height else "y"
+        axis = "x" if aspect <= 1 else "y"
     elif axis == "larger":
-        axis = "x" if film.width >= film.height else "y"
-    tangent = math.tan(math.radians(sensor.fov) / 2)
+        axis = "x" if aspect >= 1 else "y"
+    tangent = math.tan(math.radians(fov) / 2)
     if axis == "y":
         tangent *= aspect
     elif axis == "diagonal":

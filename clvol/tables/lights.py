@@ -15,7 +15,7 @@ from clvol.scene.primitives import QUADRICS
 from clvol.tables.affine import rotation_3x4
 from clvol.tables.colours import luminance, mean_luminance, rgb
 from clvol.tables.environment import envmap_distribution
-from clvol.tables.textures import lamp_textures, mean_radiance, slide
+from clvol.tables.textures import lamp_textures, mean_radiance, projector_frame, slide
 
 if TYPE_CHECKING:
     from clvol.scene.materials import Bitmap, Checkerboard, Texture
@@ -73,10 +73,12 @@ def light_table(
     power = np.zeros(len(table))
     for i, emitter in enumerate(emitters):
         power[i] = _describe_emitter(table[i], emitter, centre, radius)
-        if isinstance(emitter, records.SpotEmitter) and (picture := slide(emitter)) is not None:
-            pictures.append(picture)
-            table[i]["first"] = len(pictures)
-            power[i] *= float(luminance(mean_radiance(picture)))
+        if isinstance(emitter, records.SpotEmitter | records.ProjectorEmitter):
+            picture = slide(emitter) if isinstance(emitter, records.SpotEmitter) else emitter.texture
+            if picture is not None:
+                pictures = list(dict.fromkeys([*pictures, picture]))
+                table[i]["first"] = 1 + pictures.index(picture)
+                power[i] *= float(luminance(mean_radiance(picture)))
     faces, cdf = [np.zeros(0, np.uint32)], [np.zeros(0, np.float32)]
     if surfaces is not None:
         for i, (number, emission) in enumerate(shining, len(emitters)):
@@ -220,6 +222,15 @@ def _describe_emitter(record: np.void, emitter: records.Emitter, centre: np.ndar
             record["vector"] = axis / np.linalg.norm(axis)
             record["position"] = emitter.to_world[:3, 3] - centre
             record["cutoff_angle"], record["beam_width"] = cutoff, beam
+        case records.ProjectorEmitter():
+            width, height = emitter.half_sides
+            size = float(np.linalg.norm(emitter.to_world[:3, 2]))
+            strength = np.pi * emitter.scale * size
+            picture = emitter.irradiance if emitter.texture is None else (1.0,)
+            value, extent = tuple(strength * np.asarray(picture)), 4 * width * height
+            record["vector"] = emitter.to_world[:3, 2] / size
+            record["position"] = emitter.to_world[:3, 3] - centre
+            record["cutoff_angle"], record["beam_width"], record["area"] = projector_frame(emitter)
         case records.SunEmitter():
             solid_angle = emitter.solid_angle
             value = tuple(np.asarray(emitter.irradiance) / solid_angle)

@@ -16,7 +16,7 @@ from clvol.tables.colours import luminance, rgb
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from clvol.scene.records import SpotEmitter
+    from clvol.scene.records import ProjectorEmitter, SpotEmitter
 
 
 def mean_color(texture: Texture) -> float:
@@ -49,12 +49,29 @@ def slide(spot: SpotEmitter) -> Bitmap | Checkerboard | None:
     """A spot's texture over the plane one before it, in the frame that the device has round its axis."""
     if spot.texture is None:
         return None
-    axes = spot.to_world[:3, :3] / np.linalg.norm(spot.to_world[:3, 2])
-    x, y, _ = device_frame(axes[:, 2])
     to_square = np.eye(3)
-    to_square[:2, :2] = 0.5 / np.tan(np.radians(spot.cutoff_angle)) * axes[:, :2].T @ np.stack([x, y], axis=1)
+    to_square[:2, :2] = 0.5 / np.tan(np.radians(spot.cutoff_angle)) * _local_from_plane(spot.to_world)
     to_square[:2, 2] = 0.5
     return replace(spot.texture, to_uv=spot.texture.to_uv @ to_square)
+
+
+def projector_frame(projector: ProjectorEmitter) -> tuple[float, float, float]:
+    """(a, b, r) that take places (x, y) of the plane one before a projector to those of its picture.
+
+    u = ½ + a x + b y and v = ½ + r (a y - b x), in the frame that the device has round its axis.
+    """
+    width, height = projector.half_sides
+    turn = _local_from_plane(projector.to_world)
+    a, b = -0.5 / width * turn[0]
+    return float(a), float(b), width / height * float(np.sign(np.linalg.det(turn)))
+
+
+def _local_from_plane(to_world: np.ndarray) -> np.ndarray:
+    """Places of the plane one before a light in the device's frame to those in its own, float64 (2, 2)."""
+    axes = to_world[:3, :3] / np.linalg.norm(to_world[:3, 2])
+    x, y, _ = device_frame(axes[:, 2])
+    local: np.ndarray = axes[:, :2].T @ np.stack([x, y], axis=1)
+    return local
 
 
 def device_frame(n: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

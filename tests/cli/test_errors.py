@@ -65,9 +65,7 @@ def test_numbers_out_of_range_are_refused(options, message):
 
 @pytest.mark.parametrize("light", [LAMP, SUN], ids=["point", "directional"])
 def test_lights_that_nothing_hits_by_chance_need_light_sampling(light):
-    with pytest.raises(
-        OptionError, match=r"'none' cannot render point, spot and directional lights; .*use ratio"
-    ):
+    with pytest.raises(OptionError, match=r"point, spot and directional lights, nor projectors; .*use ratio"):
         clvol.render(scene(light), transmittance="none")
 
 

@@ -368,6 +368,11 @@ PARAMETERS = {
         LIGHT
         | {"intensity": RGB, "cutoff_angle": 30.0, "beam_width": 5.0, "texture": TEXTURE, "to_world": TURNED},
     ),
+    "projector": (
+        {"fov": 40.0},
+        LIGHT
+        | {"irradiance": TEXTURE, "scale": 2.0, "fov": 50.0, "fov_axis": "diagonal", "to_world": TURNED},
+    ),
     "sunsky": (
         {},
         LIGHT
@@ -409,6 +414,7 @@ PARAMETERS = {
 }
 INSTEAD = {
     ("perspective", "focal_length"): ({}, "85mm"),
+    ("projector", "focal_length"): ({}, "85mm"),
     ("thinlens", "focal_length"): ({"aperture_radius": 0.1}, "85mm"),
     ("radiancemeter", "to_world"): ({"film": PIXEL}, MOVED),
     ("distant", "to_world"): ({"film": PIXEL}, TURNED),

@@ -12,6 +12,7 @@ from clvol.scene.records import (
     DirectionalEmitter,
     Phase,
     PointEmitter,
+    ProjectorEmitter,
     SpotEmitter,
 )
 
@@ -35,14 +36,15 @@ PICKS = 4096
 
 
 def many_lights(points):
-    """A sky, a sun, a spot, a lamp and lights at points, round and in a fog of lumps."""
+    """A sky, a sun, a spot, a projector, a lamp and lights at points, round and in a fog of lumps."""
     corners = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
     fog = gridded(volume(np.random.default_rng(2).random((5, 5, 5)) * 9, *corners), 0.9)
     spot = SpotEmitter((3.0,), clvol.look_at((0.5, 2.5, 0.5), (0.5, 0.5, 0.5), (1, 0, 0)), 30.0, 20.0)
+    thrown = ProjectorEmitter((2.0,), 0.5, clvol.look_at((2, 2, 0.5), (0.5, 0.5, 0.5), (1, 0, 0)), 30.0)
     lamp = ball((2.0, 0.5, 0.5), 0.2)
     lamp = type(lamp)("sphere", lamp.to_world, emission=(5.0,))
     far = [PointEmitter((0.3 + n,), (0.1 * n - 0.4, 0.4, 0.5)) for n in range(points)]
-    emitters = [ConstantEmitter((0.2,)), DirectionalEmitter((2.0,), (0.0, -1.0, 0.0)), spot, *far]
+    emitters = [ConstantEmitter((0.2,)), DirectionalEmitter((2.0,), (0.0, -1.0, 0.0)), spot, thrown, *far]
     return picture([box(*corners, fog), lamp], emitters, (0.5, 0.5, -3.0), (0.5, 0.5, 0.5))
 
 
@@ -50,7 +52,7 @@ def many_lights(points):
 @pytest.mark.parametrize("points", [2, 30], ids=["all are weighed", "some are weighed"])
 def test_lights_are_chosen_with_the_probability_that_is_said(device, points, shadow_cache):
     scene = many_lights(points)
-    lights = points + 4
+    lights = points + 5
     probe = Probe(device, scene, shadow_cache=shadow_cache)
     at = np.random.default_rng(1).uniform(-0.6, 1.6, (64, 3)).astype(np.float32)
     said, counted = np.zeros((64, lights), np.float32), np.zeros((64, lights), np.float32)

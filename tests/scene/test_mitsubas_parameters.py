@@ -25,6 +25,7 @@ MITSUBAS = {
     "directional": "direction irradiance sampling_weight to_world",
     "point": "intensity position sampling_weight to_world",
     "spot": "beam_width cutoff_angle intensity sampling_weight texture to_world",
+    "projector": "focal_length fov fov_axis irradiance sampling_weight scale to_world",
     "area": "radiance sampling_weight to_world",
     "directionalarea": "radiance sampling_weight",
     "sunsky": (

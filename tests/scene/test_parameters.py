@@ -14,6 +14,7 @@ from places import TOOLS
 import clvol
 
 VALUES = np.random.default_rng(2).random((4, 5, 6), np.float32)
+PICTURE = np.ones((4, 5, 3), np.float32)
 RGB = {"type": "rgb", "value": [0.1, 0.2, 0.3]}
 NAMES = """
 sensor.near_clip sensor.far_clip sensor.film.size sensor.film.crop_size sensor.film.crop_offset sensor.x_fov
@@ -23,6 +24,7 @@ smoke.interior_medium.scale smoke.interior_medium.albedo.value.value smoke.inter
 smoke.interior_medium.phase_function.g ball.to_world ball.interior_medium.scale
 ball.interior_medium.albedo.value.value ball.interior_medium.sigma_t.value.value lamp.to_world
 lamp.emitter.radiance.value lamp.bsdf.reflectance.value wall.to_world wall.bsdf.reflectance.value
+slide.irradiance.value slide.scale slide.to_world pic.irradiance.data pic.scale pic.to_world
 coat.bsdf.diffuse_reflectance.color0.value coat.bsdf.diffuse_reflectance.color1.value coat.bsdf.alpha
 """
 """Of the scene below, as ``mi.traverse`` of Mitsuba 3.9 has them."""
@@ -44,6 +46,8 @@ def description():
         "sky": {"type": "constant"},
         "pt": {"type": "point"},
         "spot": {"type": "spot"},
+        "slide": {"type": "projector", "fov": 40.0},
+        "pic": {"type": "projector", "fov": 40.0, "irradiance": {"type": "bitmap", "bitmap": PICTURE}},
         "sun": {"type": "directional", "direction": [0, 0, 2]},
         "smoke": {"type": "cube", "bsdf": {"type": "null"}, "interior": smoke},
         "ball": {"type": "sphere", "bsdf": {"type": "null"}, "interior": fog},
@@ -75,10 +79,12 @@ def test_they_are_mitsubas_own_names():
     code = (
         "import mitsuba as mi, numpy as np; mi.set_variant('scalar_rgb'); scene = eval(input());"
         "scene['smoke']['interior']['sigma_t']['grid'] = mi.VolumeGrid(np.ones((4, 5, 6), np.float32));"
+        "scene['pic']['irradiance']['bitmap'] = mi.Bitmap(np.ones((4, 5, 3), np.float32));"
         "print(*mi.traverse(mi.load_dict(scene)).properties)"
     )
     given = description()
     given["smoke"]["interior"]["sigma_t"]["grid"] = None
+    given["pic"]["irradiance"]["bitmap"] = None
     del given["sun"]["direction"]
     done = subprocess.run([python, "-c", code], input=repr(given), capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -125,6 +131,9 @@ CHANGES = [
     ("sensor.film.size", (4, 3), "sensor/film", {"type": "hdrfilm", "width": 4, "height": 3}),
     ("sky.radiance.value", (1, 2, 3), "sky/radiance", {"type": "rgb", "value": [1, 2, 3]}),
     ("sun.direction", (0, 3, 4), "sun/direction", [0, 3, 4]),
+    ("slide.irradiance.value", (1, 2, 3), "slide/irradiance", {"type": "rgb", "value": [1, 2, 3]}),
+    ("pic.irradiance.data", 3 * PICTURE, "pic/irradiance", {"type": "bitmap", "bitmap": 3 * PICTURE}),
+    ("pic.x_fov", 30, "pic/fov", 30),
     ("smoke.interior.scale", 7.5, "smoke/interior/scale", 7.5),
     ("smoke.interior.phase.g", -0.5, "smoke/interior/phase", {"type": "hg", "g": -0.5}),
     (
@@ -215,6 +224,9 @@ MISTAKES = [
     ("smoke.interior.sigma_t.data", "smoke.vdb", "an array of numbers"),
     ("coat.to_world", np.diag([1, 2, 1, 1]), "must not stretch or shear a sphere"),
     ("spot.to_world", np.diag([1, 2, 1, 1]), "must not stretch or shear"),
+    ("pic.to_world", np.diag([1, 2, 1, 1]), "must not stretch or shear"),
+    ("pic.irradiance.data", -PICTURE, "texels must be in"),
+    ("slide.scale", -1, "must be a number that is in"),
     ("sun.direction", (0, 0, 0), "another length than 0"),
     ("pt.position", (0, 0), "three finite numbers"),
 ]

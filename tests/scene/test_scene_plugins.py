@@ -597,10 +597,7 @@ def test_8_bit_envmaps_are_srgb_decoded(tmp_path):
         ({"type": "directional", "direction": [0, 0, 1], "to_world": np.eye(4)}, "not both"),
         ({"type": "point", "position": [0, 0, np.nan]}, "three finite numbers"),
         ({"type": "point", "position": [0, 0, 1], "to_world": np.eye(4)}, "not both"),
-        (
-            {"type": "projector"},
-            "emitter 'projector' is not supported in this version; supported: constant, envmap",
-        ),
+        ({"type": "projecter"}, "did you mean 'projector'"),
         ({"type": "spot", "cutoff_angle": 0}, "leaves no light"),
         ({"type": "spot", "cutoff_angle": 200}, "in [0, 180]"),
         ({"type": "spot", "beam_width": 21}, "beam_width (21) must not exceed cutoff_angle (20)"),

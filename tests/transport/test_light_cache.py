@@ -12,7 +12,13 @@ from stat_tests import image_mean, largest_z, require_precision, z_score
 
 import clvol
 from clvol.rendering import upload
-from clvol.scene.records import ConstantEmitter, DirectionalEmitter, PointEmitter, SpotEmitter
+from clvol.scene.records import (
+    ConstantEmitter,
+    DirectionalEmitter,
+    PointEmitter,
+    ProjectorEmitter,
+    SpotEmitter,
+)
 
 OFF = {"shadow_cache": "off", "light_choice": "power", "next_event": "plain"}
 WRONG = ("zero", "one", "random", "right")
@@ -89,6 +95,9 @@ LAMPS = {
     "sun and sky": [ConstantEmitter((0.5,)), SUN],
     "far and near": [PointEmitter((40.0,), (0.5, 6.0, 0.5)), PointEmitter((0.1,), (0.5, 0.5, -0.3)), SUN],
     "a spot": [SpotEmitter((6.0,), clvol.look_at((0.5, 2.5, 0.5), (0.5, 0.5, 0.5), (1, 0, 0)), 40.0, 25.0)],
+    "a projector": [
+        ProjectorEmitter((4.0,), 1.0, clvol.look_at((0.5, 2.5, 0.5), (0.5, 0.5, 0.5), (1, 0, 0)), 30.0)
+    ],
 }
 SPP = 1 << 14
 _plain = {}
@@ -109,6 +118,7 @@ CASES = [("a sun", 0.8, kind) for kind in WRONG] + [
     ("far and near", -0.6, "right"),
     ("far and near", -0.6, "zero"),
     ("a spot", 0.6, "right"),
+    ("a projector", 0.6, "right"),
 ]
 
 
