@@ -108,7 +108,7 @@ def check_same(before: Before, session: Session) -> None:
             source = before.metadata.get("scene") or "a scene from Python"
             raise OptionError(
                 f"cannot go on from a picture of another scene: that of {source} is not this one",
-                hint=f"the scene, its files, {values} or the sensor changed: render it anew",
+                hint=f"the scene, its files, {values}, the sensor or its size changed: render it anew",
             )
         what = f"cannot go on from a picture of another {key}: {theirs!r}, not {ours!r}"
         instead = "" if theirs is None else f"give {option(key, theirs)}, or "

@@ -28,7 +28,7 @@ def check_spread(given: Mapping[str, Any], batch: bool = False) -> None:
     shared = "a batch of sensors" if batch else shared
     one = "take one of its sensors, whose numbers follow those of the scene's own" if batch else ""
     without = {
-        "checkpoint": "resume=RESULT goes on from a picture that was saved",
+        "checkpoint": f"{option('resume')} goes on from a picture that was saved",
         "profile": one or "profile a render on one device",
     }
     for name, hint in without.items():

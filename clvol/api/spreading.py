@@ -17,6 +17,7 @@ from clvol.device.device import names_several, open_device, open_devices
 from clvol.picture.estimate import Replicates
 from clvol.picture.merging import merge
 from clvol.rendering.adaptive import LEAST
+from clvol.rendering.doubts import say_missed_target
 from clvol.rendering.session import MAX_SAMPLES
 
 if TYPE_CHECKING:
@@ -96,8 +97,7 @@ class SpreadOrder:
             log.info(
                 "target error %.3g: noise %.3g; %d samples a pixel; %s", target, result.noise, done, spent
             )
-            if not result.noise <= 1.05 * target:  # the survey's foresight
-                log.warning("the noise is %.3g, the target was %.3g", result.noise, target)
+            say_missed_target(result.noise, target)
         return result
 
     @staticmethod

@@ -42,6 +42,12 @@ _PER_RUN = frozenset(
 )
 """Metadata that may differ between results that merge; everything else must agree."""
 
+_DIFFERENT = {
+    "aovs": "results with different aovs",
+    "digest": "results of different scenes: files, values of defaults or the sensor changed",
+}
+"""What is said of differences instead of their names."""
+
 _LARGEST = ("largest", "peak", "bytes", "slots", "pool")
 """Statistics whose names begin so are maxima or sizes: merged by the maximum, not added."""
 
@@ -148,10 +154,14 @@ def _check_same_render(one: Part, other: Part) -> None:
     """Raise OptionError where the two are not samples of the same picture."""
     size = {"size": (one.size, other.size)}
     aovs = {"aovs": (sorted(one.aovs), sorted(other.aovs))}
-    for key, (ours, theirs) in (size | differences(one.metadata, other.metadata) | aovs).items():
+    found = differences(one.metadata, other.metadata)
+    scenes = {key: found.pop(key) for key in ("scene", "digest") if key in found}  # others follow from these
+    for key, (ours, theirs) in (size | scenes | found | aovs).items():
         if ours != theirs:
+            what = _DIFFERENT.get(key, f"results of a different {key}")
+            said = "" if key == "digest" else f": {ours!r} and {theirs!r}"
             raise OptionError(
-                f"cannot merge results of a different {key}: {ours!r} and {theirs!r}",
+                f"cannot merge {what}{said}",
                 hint="only sample ranges of the same render can be merged",
             )
     for part in (one, other):

@@ -17,6 +17,7 @@ import numpy as np
 
 from clvol.base.progress import Glance, Progress, ProgressCallback
 from clvol.picture.result import relative_noise
+from clvol.rendering.doubts import say_missed_target
 from clvol.rendering.outcome import make_result
 from clvol.rendering.session import MAX_SAMPLES, Session, nothing_finished, seed_words
 
@@ -323,8 +324,7 @@ class TargetRender:
             counts.mean(),
             self.survey.samples[0],
         )
-        if not noise <= 1.05 * self.target:  # the survey's foresight
-            log.warning("the noise is %.3g, the target was %.3g", noise, self.target)
+        say_missed_target(noise, self.target)
 
 
 def _smoothed(variance: np.ndarray, width: int, height: int) -> np.ndarray:

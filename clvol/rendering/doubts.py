@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 log = logging.getLogger("clvol")
 LARGE_WEIGHT = 100.0
 """Paths that weigh so much more than others are rare: few samples do not show them."""
+_FORESIGHT = 1.05
+"""Of a target error, up to which it counts as reached: surveys foresee no better."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +87,13 @@ def say_doubts(result: Result, expected: Expected) -> None:
             "no path met anything in the media, and all samples are the same: what is rare there has not "
             "been seen, and the noise is only a bound"
         )
+
+
+def say_missed_target(noise: float, target: float) -> None:
+    """Log where the noise, nan while it is unknown, is above what a render was to reach."""
+    if not noise <= _FORESIGHT * target:
+        known = "unknown" if math.isnan(noise) else f"{noise:.3g}"
+        log.warning("the noise is %s, the target was %.3g", known, target)
 
 
 def say_seconds(result: Result) -> None:

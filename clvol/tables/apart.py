@@ -46,7 +46,8 @@ def depth_across(matter: Matter, volumes: Sequence[PreparedVolume]) -> float:
     low, high = bricks.minimum, bricks.maximum
     if transfer is not None:
         low, high = classified(low, high, transfer)
-    mean = 0.75 * low.mean(axis=(0, 1, 2)) + 0.25 * high.mean(axis=(0, 1, 2))
+    low, high = (side.mean(axis=(0, 1, 2), dtype=np.float64) for side in (low, high))
+    mean = 0.75 * low + 0.25 * high
     edges = volume.voxel * bricks.size
     return float(np.max(mean * np.array(matter.media[0].scale)) * edges.mean())
 

@@ -156,6 +156,15 @@ def test_results_of_another_render_are_refused_by_name(key: str, value: object) 
         merge([make_result(0, 2), make_result(2, 2, **{key: value})])
 
 
+def test_another_scene_is_named_first_and_without_its_digest() -> None:
+    first, other = make_result(0, 2), {"background": "expected", "digest": "0f"}
+    with pytest.raises(OptionError, match="cannot merge results of different scenes: ") as refused:
+        merge([first, make_result(2, 2, **other)])
+    assert "0f" not in str(refused.value) and "background" not in str(refused.value)
+    with pytest.raises(OptionError, match=r"different scene: .*fire\.xml"):
+        merge([first, make_result(2, 2, **other, scene="fire.xml")])
+
+
 def test_results_of_another_size_are_refused() -> None:
     zeros = np.zeros((2, 2, 3))
     other = Result.from_estimate(Moments(zeros, zeros, 2), (2, 2), {}, {}, make_result(2, 2).metadata)

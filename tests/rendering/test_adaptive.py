@@ -408,6 +408,11 @@ def test_a_black_scene_ends_and_says_why(device, caplog):
     assert finished(black, 1, 0.01, most=3).picture.samples.max() == 3
 
 
+def test_one_sample_has_no_noise_to_be_judged_by(caplog):
+    clvol.render(inside(), spp=1, target_error=0.1)
+    assert "the noise is unknown, the target was 0.1" in caplog.text
+
+
 @pytest.mark.parametrize("sampler", ["independent", "sobol"])
 def test_a_scene_without_noise_ends_at_once(device, sampler, caplog):
     render = finished(opened(device, inside(thickness=0.0), sampler), 1, 1e-12)

@@ -107,7 +107,7 @@ def test_checkpoints_are_written_on_the_way(tmp_path, monkeypatch):
     [
         ({"seed": SEED + 1}, "another seed"),
         ({"technique": "weighted-delta"}, "another technique"),
-        ({"size": (5, 4)}, "another scene|pixels|not that of this render"),
+        ({"size": (5, 4)}, "the sensor or its size changed"),
         ({"aov": ["depth"]}, "with one with"),
         ({"spp": 3}, "has samples 0 to 3 of each pixel"),
         ({"samples": (1, 8)}, "has samples 0 to 3 of each pixel"),

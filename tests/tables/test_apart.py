@@ -11,6 +11,7 @@ from stat_tests import largest_z
 import clvol
 from clvol.planning.settled import FAR_APART
 from clvol.scene.records import DirectionalEmitter
+from clvol.tables.prepare import prepare
 
 CUBE = (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0)
 ALBEDO, EDGE = 0.8, 2.0
@@ -77,3 +78,11 @@ def test_the_guess_of_the_background_does_not_drown_a_thin_channel(technique):
     depths = 10.0, 5.0, 1e-5
     result = clvol.render(lit(grid(depths)), spp=1 << 12, seed=2, technique=technique)
     assert_thin_channel(result, depths[2], error=0.3)
+
+
+@pytest.mark.filterwarnings("error")
+def test_the_mean_of_large_densities_does_not_overflow():
+    """Of 64 densities of 1e38 the sum is beyond single precision, and their depth is not."""
+    cube = volume(np.full((20, 20, 20), 1e38, np.float32), *CUBE)
+    settled = prepare(lit(gridded(cube, ALBEDO, scale=1e-38))).plan.settled
+    assert settled.depth == pytest.approx(EDGE, rel=0.05)
