@@ -133,6 +133,7 @@ MATERIALS = [
 BENDS = [
     {"type": "bumpmap", "heights": TEXTURE, "nested": DIFFUSE},
     {"type": "normalmap", "normalmap": TEXTURE, "nested": {"type": "roughplastic"}},
+    {"type": "diffuse", "reflectance": {"type": "volume", "volume": {"type": "gridvolume", "grid": COLOURS}}},
 ]
 
 

@@ -155,7 +155,14 @@ INLINE void show_texture(const Scene *scene, __global const Emitter *emitter, fl
     hit.primitive = light->primitive;
     hit.u = root * (1.0f - v);
     hit.v = root * v;
+#if CLVOL_HAS_VOLUME_TEXTURES
+    const Surface surface = hit_surface(scene, ray, &hit);
+    Scene there = *scene;
+    there.texture_point = surface.p;
+    light->value = textured_radiance(&there, emitter, surface.uv) / light->pdf;
+#else
     light->value = textured_radiance(scene, emitter, hit_surface(scene, ray, &hit).uv) / light->pdf;
+#endif
 }
 #endif
 

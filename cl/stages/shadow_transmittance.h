@@ -106,6 +106,10 @@ INLINE Spectrum shadow_share(const Scene *scene, uint slot, Tally *tally)
 #endif
     Inside inside = path_shadow_inside(scene, slot);
     const Target target = shadow_target(scene, slot, ray, reach);
+#if CLVOL_HAS_VOLUME_TEXTURES
+    Scene there = *scene;
+    scene = &there;
+#endif
     for (Passed passed = shadow_passed(scene, slot); passed.count < MOST_PASSED; ++passed.count) {
         Hit hit = closest_hit(scene, ray, passed.last.t, passed.last.primitive, reach);
         const bool last = hit.primitive == NO_PRIMITIVE || is_target(&hit, &target);
@@ -113,6 +117,9 @@ INLINE Spectrum shadow_share(const Scene *scene, uint slot, Tally *tally)
         Surface surface;
         if (!last) {
             surface = hit_surface(scene, ray, &hit);
+#if CLVOL_HAS_VOLUME_TEXTURES
+            there.texture_point = surface.p;
+#endif
             const float3 wi = to_local(&surface, -ray.d);
             Side side;
             if (!side_of(scene, scene->shapes + surface.shape, wi, &side))

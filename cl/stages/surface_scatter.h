@@ -137,6 +137,11 @@ INLINE bool shade_surface(const Scene *scene, uint slot, const Draws *draws, boo
     const Ray ray = path_ray(scene, slot);
     const Hit hit = path_hit(scene, slot);
     VARIED Surface surface = hit_surface(scene, ray, &hit);
+#if CLVOL_HAS_VOLUME_TEXTURES
+    Scene there = *scene;
+    there.texture_point = surface.p;
+    scene = &there;
+#endif
     __global const Shape *shape = scene->shapes + surface.shape;
 #if CLVOL_HAS_AREA && CLVOL_HIDE_EMITTERS /* the camera sees through lamps, as in Mitsuba */
     if (shape->emitter >= 0 && path_bounce(scene, slot) == 0)

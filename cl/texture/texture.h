@@ -5,6 +5,7 @@
 #ifndef CLVOL_TEXTURE_TEXTURE_H
 #define CLVOL_TEXTURE_TEXTURE_H
 #include "core/scene.h"
+#include "texture/volume.h"
 
 INLINE int wrapped(int index, int count, int wrap)
 {
@@ -40,6 +41,10 @@ INLINE float3 bitmap_value(const Scene *scene, __global const Texture *texture, 
 INLINE float3 texture_value(const Scene *scene, int number, float2 surface_uv)
 {
     __global const Texture *texture = scene->textures + number;
+#if CLVOL_HAS_VOLUME_TEXTURES
+    if (texture->kind == TEXTURE_VOLUME)
+        return volume_texture(scene, texture);
+#endif
     __global const float *m = texture->to_uv;
     const float2 uv = (float2)(m[0] * surface_uv.x + m[1] * surface_uv.y + m[2],
                                m[3] * surface_uv.x + m[4] * surface_uv.y + m[5]);

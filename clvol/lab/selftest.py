@@ -37,8 +37,9 @@ from clvol.lab.trials import Trial, rounds
 from clvol.lab.verdict import SelfTest
 from clvol.planning.choices import Choices
 from clvol.rendering.session import MAX_SAMPLES
-from clvol.scene.materials import Bitmap, Checkerboard
+from clvol.scene.materials import Bitmap, Checkerboard, VolumeTexture
 from clvol.scene.records import Scene
+from clvol.scene.volume import largest_value
 
 if TYPE_CHECKING:
     from clvol.picture.result import Result
@@ -218,4 +219,6 @@ def _brightest(emission: Texture) -> float:
         return float(emission.pixels.max())
     if isinstance(emission, Checkerboard):
         return max(*emission.color0, *emission.color1)
+    if isinstance(emission, VolumeTexture):
+        return largest_value(emission.volume)
     return max(emission)

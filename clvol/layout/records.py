@@ -149,10 +149,10 @@ TEXTURE = _record(
     ("kind", "i", 1),  # TEXTURE_BITMAP, TEXTURE_CHECKERBOARD
     ("nearest", "i", 1),
     ("wrap", "i", 1),  # WRAP_REPEAT, WRAP_MIRROR, WRAP_CLAMP
-    ("first", "u", 1),  # first texel in `texels`, in units of 3 floats
+    ("first", "u", 1),  # first texel in `texels`, in units of 3 floats; of a volume: its number
     ("size", "i", 2),  # width, height
-    ("to_uv", "f", 6),  # two rows of a 2x3 matrix
-    ("color0", "f", 3),
+    ("to_uv", "f", 6),  # two rows of a 2x3 matrix; of a volume: where its first sample is, and how many
+    ("color0", "f", 3),  # of a volume: what makes its channels one number; 0 where they stay
     ("color1", "f", 3),
 )
 
@@ -214,6 +214,9 @@ RECORDS = {
 RARE_RECORDS = {"Glow": "CLVOL_HAS_GLOW"}
 """Records that few scenes have, and the macro that says so: what others compile does not hold them."""
 
+RARE_KINDS = {"TEXTURE_VOLUME": "CLVOL_HAS_VOLUME_TEXTURES"}
+"""The same of numbered kinds."""
+
 ENUMS = {
     "SHAPE": ("NONE", "CUBE", "SPHERE"),
     "PHASE": ("ISOTROPIC", "HG", "RAYLEIGH", "TABPHASE"),
@@ -224,7 +227,7 @@ ENUMS = {
     "MATERIAL": BSDFS,
     "DISTRIBUTION": ("BECKMANN", "GGX"),
     "PRINCIPLED": PRINCIPLED,
-    "TEXTURE": ("BITMAP", "CHECKERBOARD"),
+    "TEXTURE": ("BITMAP", "CHECKERBOARD", "VOLUME"),
     "WRAP": ("REPEAT", "MIRROR", "CLAMP"),
     "ABSORPTION": ("SAMPLE", "WEIGHT", "MIXED"),
     "ROULETTE": ("DEPTH", "WEIGHT"),

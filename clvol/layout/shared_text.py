@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from clvol.layout import constants
 from clvol.layout.arguments import ARGUMENTS
 from clvol.layout.bsdfs import BSDF_FACTS
-from clvol.layout.records import ENUMS, RARE_RECORDS, RECORDS
+from clvol.layout.records import ENUMS, RARE_KINDS, RARE_RECORDS, RECORDS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -57,13 +57,18 @@ def shared_text() -> str:
     """
     parts = [_where(RARE_RECORDS.get(name), record_text(name, dtype)) for name, dtype in RECORDS.items()]
     for family, names in ENUMS.items():
-        parts += [f"#define {family}_{name.upper()} {value}" for value, name in enumerate(names)]
+        for value, name in enumerate(names):
+            kind = f"{family}_{name.upper()}"
+            parts.append(_where(RARE_KINDS.get(kind), f"#define {kind} {value}"))
     for name in _NUMBERS:
         value = getattr(constants, name)
         parts.append(f"#define {name} {value}" if value < 1 << 16 else f"#define {name} 0x{value:08X}u")
     members = "\n".join(
         _where(argument.needs if argument.rare else None, f"    {argument.c_type} {argument.name};")
         for argument in ARGUMENTS
+    )
+    members += "\n" + _where(
+        "CLVOL_HAS_VOLUME_TEXTURES", "    float3 texture_point; /* see texture/volume.h */"
     )
     parts.append(f"typedef struct {{\n{members}\n}} Scene;")
     return "\n".join(parts) + "\n"

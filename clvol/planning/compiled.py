@@ -78,6 +78,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_HAS_VERTEX_UVS": int(f.vertex_uvs),
         "CLVOL_HAS_TEXTURES": int(f.textures),
         "CLVOL_HAS_BITMAPS": int(f.bitmaps),
+        "CLVOL_HAS_VOLUME_TEXTURES": int(f.volume_textures),
         "CLVOL_HAS_MATERIAL_TABLES": int(f.material_tables),
         "CLVOL_HAS_ROUGHNESS_TEXTURES": int(f.rough_textures),
         "CLVOL_VARIED_ROUGHNESS": int(f.rough_textures or any("PRINCIPLED" in name for name in f.bsdfs)),

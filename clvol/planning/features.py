@@ -74,6 +74,7 @@ class Features:
     chromatic_surfaces: bool = False
     textures: bool = False
     bitmaps: bool = False
+    volume_textures: bool = False
     material_tables: bool = False
     rough_textures: bool = False
     bumps: bool = False

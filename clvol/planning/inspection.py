@@ -16,11 +16,14 @@ from clvol.scene.material_facts import (
     has_bumps,
     has_rough_textures,
     has_tables,
+    has_textures,
     is_textured,
     is_transmissive,
+    needs_uvs,
     passes_light,
     reflects,
     samples_lights,
+    texture_volumes,
 )
 from clvol.scene.material_facts import is_grey as bsdf_is_grey
 from clvol.scene.materials import Bitmap
@@ -49,10 +52,12 @@ def find_features(scene: records.Scene, found: Boundaries) -> Features:
     surfaces = [scene.shapes[n] for n in found.surfaces]
     lamps = [s for s in surfaces if s.emission is not None]
     media = [entry.medium for entry in found.entries]
+    shown = [v for s in surfaces for v in texture_volumes(s.bsdf, s.emission)]
     return Features(
         **_place_features(scene, found),
         **_medium_features(media),
-        **_volume_features([v for m in media for v in medium_volumes(m)]),
+        **_volume_features([v for m in media for v in medium_volumes(m)] + shown),
+        volume_textures=bool(shown),
         **_surface_features(surfaces),
         **_texture_features(scene, surfaces),
         **_light_features(scene, media, surfaces, lamps),
@@ -151,7 +156,7 @@ def _surface_features(surfaces: list[records.Shape]) -> dict[str, Any]:
     """What rays meet beside media."""
     meshes = [mesh_of(s) for s in surfaces if s.kind not in QUADRICS]
     bsdfs = [s.bsdf for s in surfaces]
-    textures = any(bsdf_textures(s.bsdf) or is_textured(s.emission) for s in surfaces)
+    textures = any(has_textures(s.bsdf) or needs_uvs(s.emission) for s in surfaces)
     return {
         "surfaces": len(surfaces),
         "triangles": bool(meshes),
@@ -205,8 +210,12 @@ def _light_features(
 
 def _turns(bsdf: Bsdf) -> bool:
     """Whether the direction of its tangents matters."""
-    sides = [side.bsdf for side in bsdf_parts(bsdf)]
-    return any(getattr(b, "alpha_u", 0) != getattr(b, "alpha_v", 0) for b in sides)
+    return any(
+        side.bend is not None
+        or getattr(side.bsdf, "alpha_u", 0) != getattr(side.bsdf, "alpha_v", 0)
+        or getattr(side.bsdf, "anisotropic", (0.0,)) != (0.0,)
+        for side in bsdf_parts(bsdf)
+    )
 
 
 def _clips_homogeneous(found: Boundaries) -> bool:

@@ -114,7 +114,7 @@ def _light_arrays(prepared: PreparedScene, there: Residence, needed: set[str]) -
     )
     arrays = {"emitters": lights.emitters, "light_faces": lights.faces, "light_cdf": lights.cdf}
     if prepared.surfaces is not None:
-        arrays |= _surface_arrays(prepared.surfaces, lights)
+        arrays |= _surface_arrays(prepared, prepared.surfaces, lights)
     elif "textures" in needed:
         materials = material_table([], lights.textures)
         arrays |= {"textures": materials.textures, "texels": materials.texels}
@@ -129,9 +129,10 @@ def _bounds(majorant: PreparedMajorant) -> np.ndarray:
     return marked_empty(majorant.majorant.reshape(majorant.cells[::-1])).reshape(-1)
 
 
-def _surface_arrays(surfaces: Surfaces, lights: LightTable) -> dict[str, np.ndarray]:
+def _surface_arrays(prepared: PreparedScene, surfaces: Surfaces, lights: LightTable) -> dict[str, np.ndarray]:
     """What the device knows of surfaces, by argument name; without what no surface has."""
-    materials = material_table([shape.bsdf for shape in surfaces.shapes], lights.textures)
+    volumes = {id(volume): number for number, volume in enumerate(prepared.matter.volumes)}
+    materials = material_table([shape.bsdf for shape in surfaces.shapes], lights.textures, volumes)
     table = surfaces.table.copy()
     table["front"], table["back"] = materials.sides.T
     table["emitter"] = lights.of_shape

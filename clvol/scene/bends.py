@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from clvol.scene.materials import Bitmap, Bsdf, BumpMap, NormalMap
+from clvol.scene.materials import Bitmap, Bsdf, BumpMap, NormalMap, VolumeTexture
 from clvol.scene.sides import bsdf_parts
 from clvol.scene.texture import texture
 
@@ -17,6 +17,8 @@ def normalmap(reader: Reader) -> NormalMap:
     if not reader.has("normalmap"):
         reader.fail("a normalmap needs a normalmap, the texture of its normals")
     normals = texture(reader, "normalmap", 0.5)
+    if isinstance(normals, VolumeTexture) and normals.volume.grid.channels != 3:
+        reader.fail("a normalmap needs a volume of three channels, this one has one", "normalmap")
     return NormalMap(_nested(reader), normals, **_flags(reader))
 
 

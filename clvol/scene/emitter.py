@@ -9,7 +9,7 @@ import numpy as np
 from clvol.base.rows import bands
 from clvol.scene.files import find_parameter
 from clvol.scene.image import image_from_array, read_image
-from clvol.scene.materials import Bitmap, Checkerboard, Texture
+from clvol.scene.materials import Bitmap, Checkerboard, MeshAttribute, Texture, VolumeTexture
 from clvol.scene.reader import BRIGHTEST, Reader
 from clvol.scene.records import (
     ConstantEmitter,
@@ -17,7 +17,6 @@ from clvol.scene.records import (
     EnvmapEmitter,
     PointEmitter,
     ProjectorEmitter,
-    Spectrum,
     SpotEmitter,
 )
 from clvol.scene.sensor import field_of_view, x_field_of_view
@@ -146,7 +145,8 @@ def _slide(reader: Reader, cutoff: float) -> Bitmap | Checkerboard | None:
 def projector(reader: Reader) -> ProjectorEmitter:
     """The `projector` plugin: a perspective camera backwards, whose picture is `irradiance` times `scale`."""
     accept_common(reader)
-    irradiance = _colour_or_picture(reader, "irradiance")
+    irradiance = _colour_or_texture(reader, "irradiance", volumes=False)
+    assert not isinstance(irradiance, VolumeTexture)
     scale = reader.number("scale", 1.0, minimum=0.0, maximum=LARGEST_SCALE)
     rows, columns = irradiance.pixels.shape[:2] if isinstance(irradiance, Bitmap) else (1, 1)
     x_fov = x_field_of_view(*field_of_view(reader), columns / rows)
@@ -159,17 +159,17 @@ def projector(reader: Reader) -> ProjectorEmitter:
 def area(reader: Reader) -> AreaLight:
     """The `area` plugin, which makes the shape round it a light: of one radiance, or of a texture of them."""
     accept_common(reader)
-    return AreaLight(_colour_or_picture(reader, "radiance"))
+    return AreaLight(_colour_or_texture(reader, "radiance", volumes=True))
 
 
-def _colour_or_picture(reader: Reader, name: str) -> Spectrum | Bitmap | Checkerboard:
-    """What a light is everywhere, or over (u, v)."""
+def _colour_or_texture(reader: Reader, name: str, volumes: bool) -> Texture:
+    """What a light is everywhere, or by a texture; `volumes`: which may be of a volume."""
     if reader.is_value(name):
         return reader.color(name, 1.0, light=True, maximum=BRIGHTEST)
     found = texture(reader, name, 1.0, BRIGHTEST)
-    if type(found) not in (Bitmap, Checkerboard):  # as attributes of meshes are
-        reader.refuse_plugin(name, "a number, an rgb, a spectrum, a bitmap or a checkerboard")
-    assert isinstance(found, Bitmap | Checkerboard)
+    if isinstance(found, MeshAttribute) or (isinstance(found, VolumeTexture) and not volumes):
+        known = "a bitmap, a checkerboard or a volume" if volumes else "a bitmap or a checkerboard"
+        reader.refuse_plugin(name, f"a number, an rgb, a spectrum, {known}")
     return found
 
 

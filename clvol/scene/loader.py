@@ -138,6 +138,7 @@ PLUGINS: PluginTable = {
         "bitmap": texture.bitmap,
         "checkerboard": texture.checkerboard,
         "mesh_attribute": mesh_attribute,
+        "volume": texture.volume,
     },
 }
 """Kind -> plugin name -> the function that builds its record."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from clvol.layout import BSDF_FACTS, PRINCIPLED_NUMBERS
 from clvol.scene.materials import (
     Bitmap,
@@ -13,8 +15,13 @@ from clvol.scene.materials import (
     RoughConductor,
     RoughDielectric,
     Texture,
+    Varied,
+    VolumeTexture,
 )
 from clvol.scene.sides import Mixture, Side, bsdf_looks, bsdf_parts, bsdf_weights, side_kind
+
+if TYPE_CHECKING:
+    from clvol.scene.records import GridVolume
 
 _COLORS = (
     *("reflectance", "diffuse_reflectance", "specular_reflectance", "specular_transmittance"),
@@ -38,6 +45,8 @@ def color_is_grey(color: Texture) -> bool:
     """Whether all channels are alike, of a texture everywhere."""
     if isinstance(color, Bitmap):
         return bool((color.pixels == color.pixels[..., :1]).all())
+    if isinstance(color, VolumeTexture):
+        return color.volume.grid.channels == 1
     if isinstance(color, Checkerboard):
         return color_is_grey(color.color0) and color_is_grey(color.color1)
     return len(set(color)) == 1
@@ -48,12 +57,12 @@ def bsdf_bends(bsdf: Bsdf) -> list[NormalMap | BumpMap]:
     return list(dict.fromkeys(side.bend for side in bsdf_parts(bsdf) if side.bend is not None))
 
 
-def _bend_map(bend: NormalMap | BumpMap) -> Bitmap | Checkerboard:
+def _bend_map(bend: NormalMap | BumpMap) -> Varied:
     """The texture that bends a surface; normals that are the same everywhere need one too."""
     if isinstance(bend, BumpMap):
         return bend.texture
     normals = bend.normalmap
-    return normals if isinstance(normals, Bitmap | Checkerboard) else Checkerboard(normals, normals)
+    return normals if isinstance(normals, Varied) else Checkerboard(normals, normals)
 
 
 def has_bumps(bsdf: Bsdf) -> bool:
@@ -99,27 +108,37 @@ def samples_lights(bsdf: Bsdf) -> bool:
     return not all(BSDF_FACTS[kind].smooth for kind in bsdf_kinds(bsdf))
 
 
-def bsdf_textures(bsdf: Bsdf) -> list[Bitmap | Checkerboard]:
+def bsdf_textures(bsdf: Bsdf) -> list[Varied]:
     """Its textures, opacities included, in no particular order."""
     found = [t for side in bsdf_parts(bsdf) for t in (*_colors(side), *_numbers(side), *side.opacities)]
     found += bsdf_weights(bsdf) + [_bend_map(bend) for bend in bsdf_bends(bsdf)]
-    return [t for t in found if isinstance(t, Bitmap | Checkerboard)]
+    return [t for t in found if isinstance(t, Varied)]
 
 
 def is_textured(color: Texture | None) -> bool:
+    """Whether a colour varies over a surface."""
+    return isinstance(color, Varied)
+
+
+def needs_uvs(color: Texture | None) -> bool:
     """Whether a colour is one over (u, v)."""
-    return isinstance(color, Bitmap | Checkerboard)
+    return isinstance(color, Varied) and not isinstance(color, VolumeTexture)
+
+
+def texture_volumes(bsdf: Bsdf, emission: Texture | None) -> list[GridVolume]:
+    """The volumes that textures of a surface look up."""
+    return [t.volume for t in (*bsdf_textures(bsdf), emission) if isinstance(t, VolumeTexture)]
 
 
 def has_rough_textures(bsdf: Bsdf) -> bool:
     """Whether a microfacet model's roughness has a texture (that of principled ones is in a table)."""
     sides = [s.bsdf for s in bsdf_parts(bsdf) if isinstance(s.bsdf, RoughDielectric | RoughConductor)]
-    return any(isinstance(a, Bitmap | Checkerboard) for s in sides for a in (s.alpha_u, s.alpha_v))
+    return any(isinstance(a, Varied) for s in sides for a in (s.alpha_u, s.alpha_v))
 
 
 def has_textures(bsdf: Bsdf) -> bool:
-    """Whether anything about it varies over the surface."""
-    return bool(bsdf_textures(bsdf))
+    """Whether anything about it is a texture over (u, v)."""
+    return any(map(needs_uvs, bsdf_textures(bsdf)))
 
 
 def has_bitmaps(bsdf: Bsdf) -> bool:

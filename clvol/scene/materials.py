@@ -7,8 +7,12 @@ As in `records`, nothing here knows Mitsuba's syntax or OpenCL.  A shape's BSDF 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from clvol.scene.fields import GridVolume
 
 Spectrum = tuple[float, ...]
 
@@ -49,11 +53,21 @@ class MeshAttribute(Bitmap):
     scale: float = 1.0
 
 
-Texture = Spectrum | Bitmap | Checkerboard
-"""A colour everywhere the same, or one over (u, v)."""
+@dataclass(frozen=True, eq=False)
+class VolumeTexture:
+    """What a volume holds at the points of a surface, wherever these lie in the world."""
 
-Roughness = float | Bitmap | Checkerboard
-"""A number everywhere the same, or one over (u, v)."""
+    volume: GridVolume
+
+
+Varied = Bitmap | Checkerboard | VolumeTexture
+"""A colour that varies over a surface."""
+
+Texture = Spectrum | Varied
+"""A colour everywhere the same, or one that varies."""
+
+Roughness = float | Varied
+"""A number everywhere the same, or one that varies."""
 
 
 @dataclass(frozen=True)

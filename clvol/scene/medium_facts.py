@@ -44,7 +44,7 @@ class Matter:
     Parameters
     ----------
     media : in the order of the entries that name them first.  of_entry : number of each entry's medium.
-    volumes : in the order in which the media name them first.
+    volumes : in the order in which the media name them first; then those that surfaces alone show.
     roles : for each medium, the number of its volume by what of it that is.
     """
 
@@ -54,10 +54,13 @@ class Matter:
     roles: tuple[dict[str, int], ...]
 
 
-def number_matter(media: Sequence[records.Medium]) -> Matter:
-    """Number the media of a scene's entries, one for each, and their volumes: objects, not values."""
+def number_matter(media: Sequence[records.Medium], others: Sequence[records.GridVolume] = ()) -> Matter:
+    """Number the media of a scene's entries, one for each, and their volumes: objects, not values.
+
+    others : volumes that surfaces show.
+    """
     distinct, of_entry = _numbered(media)
-    volumes, numbers = _numbered([v for medium in distinct for v in medium_volumes(medium)])
+    volumes, numbers = _numbered([v for medium in distinct for v in medium_volumes(medium)] + [*others])
     left = iter(numbers)
     roles = tuple({name: next(left) for name in volume_roles(medium)} for medium in distinct)
     return Matter(tuple(distinct), tuple(of_entry), tuple(volumes), roles)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clvol.scene.material_facts import bsdf_textures
+from clvol.scene.material_facts import bsdf_textures, needs_uvs
 from clvol.scene.materials import Bitmap, Bsdf, BumpMap, MeshAttribute, NormalMap, Texture
 from clvol.scene.sides import bsdf_parts
 from clvol.scene.texture import check_texels
@@ -116,7 +116,7 @@ def _check_alone(reader: Reader, bsdf: Bsdf, mesh: Mesh, mixed: bool) -> None:
     """Attributes take the place of texture coordinates: what needs these cannot be in the same BSDF."""
     if any(isinstance(part, NormalMap | BumpMap) for part in _parts(bsdf)):
         reader.unsupported("attributes of a mesh under or in a map of normals or bumps are not supported")
-    others = any(not isinstance(texture, MeshAttribute) for texture in bsdf_textures(bsdf))
+    others = any(needs_uvs(t) and not isinstance(t, MeshAttribute) for t in bsdf_textures(bsdf))
     if others or mixed:
         reader.unsupported(
             "a shape that shows attributes of a mesh and other textures is not supported",

@@ -271,7 +271,7 @@ def _bsdf(bsdf: Any, seen: set[int]) -> Found:
         value = getattr(bsdf, name)
         if name in _NESTED:
             yield from _nested(_NESTED[name], _bsdf(value, seen))
-        elif name in _BSDF_NUMBERS and not isinstance(value, materials.Bitmap | materials.Checkerboard):
+        elif name in _BSDF_NUMBERS and not isinstance(value, materials.Varied):
             yield name, _field(bsdf, name, values.number(0.0))
         elif name == "scale" and isinstance(bsdf, materials.BumpMap):
             yield name, _field(bsdf, name, values.number())
@@ -283,6 +283,9 @@ def _bsdf(bsdf: Any, seen: set[int]) -> Found:
             yield f"{name}.value", _colour(bsdf, name, 2.0 if name == "diff_trans" else 1.0)
         elif isinstance(value, materials.Checkerboard):
             yield from _nested(name, _bsdf(value, seen))
+        elif isinstance(value, materials.VolumeTexture) and id(value.volume) not in seen:
+            seen.add(id(value.volume))
+            yield from _nested(f"{name}.volume", _volume(value.volume, 1.0, signed=False))
         elif isinstance(value, materials.Bitmap) and id(value) not in seen:
             seen.add(id(value))
             yield f"{_NESTED.get(name, name)}.data", _field(value, "pixels", values.texels, values.frozen)

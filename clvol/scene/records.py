@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from clvol.scene.fields import ConstVolume as ConstVolume
+from clvol.scene.fields import GridVolume as GridVolume
+from clvol.scene.fields import Volume as Volume
 from clvol.scene.films import Film as Film
 from clvol.scene.films import ReconstructionFilter as ReconstructionFilter
 from clvol.scene.films import Sampler as Sampler
@@ -23,7 +26,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from clvol.volumes.grid import Grid
     from clvol.volumes.transfer import Transfer, Transfers
 
 Spectrum = tuple[float, ...]
@@ -121,38 +123,6 @@ class Batch:
     def medium(self) -> Medium | None:
         """One that a camera names, if any does."""
         return next((part.medium for part in self.parts if part.medium is not None), None)
-
-
-@dataclass(frozen=True, eq=False)
-class ConstVolume:
-    """The same value at every point of the unit cube under `to_world` (4x4, local to world)."""
-
-    value: Spectrum
-    to_world: np.ndarray = field(default_factory=lambda: np.eye(4))
-
-
-@dataclass(frozen=True, eq=False)
-class GridVolume:
-    """A sampled field in the world.
-
-    `index_to_world` (4x4) maps the grid's index space, where sample (i, j, k) sits at the point
-    (i, j, k), to the world.  The field is defined on the index-space box `lower`..`upper`
-    (float64 (3,), x y z); for a cell-centred gridvolume that is -½ .. n-½.
-    """
-
-    grid: Grid
-    index_to_world: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    filter_type: str = "trilinear"  # "trilinear" | "nearest"
-    wrap_mode: str = "clamp"  # "clamp" | "repeat" | "mirror": values outside lower..upper
-    clipped: bool = True  # False: a vdb whose background is not 0 reaches beyond its box
-    source: str = ""  # file and grid, for messages
-    sanitize: bool = False  # NaN and slightly negative samples are to be 0
-    repairs: str = ""  # how many of them were
-
-
-Volume = ConstVolume | GridVolume
 
 
 @dataclass(frozen=True, eq=False)

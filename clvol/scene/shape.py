@@ -12,8 +12,8 @@ from clvol.errors import SceneError
 from clvol.scene.curves import read_curves
 from clvol.scene.emitter import AreaLight
 from clvol.scene.files import find_parameter
-from clvol.scene.material_facts import has_textures, is_textured
-from clvol.scene.materials import Bitmap, Checkerboard, Diffuse, FrontOnly
+from clvol.scene.material_facts import has_textures, needs_uvs
+from clvol.scene.materials import Diffuse, FrontOnly
 from clvol.scene.mesh_arrays import read_arrays
 from clvol.scene.mesh_attributes import with_attributes
 from clvol.scene.mesh_files import read_mesh
@@ -151,9 +151,7 @@ def _shape(reader: Reader, kind: str, to_world: np.ndarray, triangles: Mesh | No
             reader.node.where,
         )
     made_of: Bsdf = reader.build(bsdf) if bsdf else Diffuse((0.0,) if emission else (0.5,))
-    made_of, triangles = with_attributes(
-        reader, made_of, triangles, isinstance(emission, Bitmap | Checkerboard)
-    )
+    made_of, triangles = with_attributes(reader, made_of, triangles, needs_uvs(emission))
     made = Shape(
         kind,
         to_world,
@@ -165,7 +163,7 @@ def _shape(reader: Reader, kind: str, to_world: np.ndarray, triangles: Mesh | No
         mesh=triangles,
         name=reader.node.id,
     )
-    if triangles is not None and triangles.uvs is None and (has_textures(made.bsdf) or is_textured(emission)):
+    if triangles is not None and triangles.uvs is None and (has_textures(made.bsdf) or needs_uvs(emission)):
         name = made.name or triangles.source
         log.warning(
             "%s has a texture and no texture coordinates: it shows the texture's (0, 0) all over", name

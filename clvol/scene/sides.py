@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING
 
 from clvol.layout import BSDF_FACTS
 from clvol.scene.materials import (
-    Bitmap,
     Blend,
     Bsdf,
     BumpMap,
-    Checkerboard,
     Conductor,
     Dielectric,
     Diffuse,
@@ -27,6 +25,7 @@ from clvol.scene.materials import (
     RoughPlastic,
     Texture,
     TwoSided,
+    Varied,
 )
 
 if TYPE_CHECKING:
@@ -137,7 +136,7 @@ def _masked(mask: Mask) -> tuple[Look | None, Look | None]:
     if isinstance(front, Side) and not isinstance(back, Mixture):
         if isinstance(front.bsdf, Null) or mask.opacity in ((1.0,), (1.0, 1.0, 1.0)):
             return front, back
-        if sum(isinstance(o, Bitmap | Checkerboard) for o in (mask.opacity, *front.opacities)) <= 1:
+        if sum(isinstance(o, Varied) for o in (mask.opacity, *front.opacities)) <= 1:
             back = Side(front.bsdf, front.opacities, black=True) if back is None else back
             sides = [replace(side, opacities=(*side.opacities, mask.opacity)) for side in (front, back)]
             return sides[0], sides[1]

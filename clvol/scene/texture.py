@@ -10,9 +10,13 @@ import numpy as np
 from clvol.base.rows import bands
 from clvol.scene.files import find_parameter
 from clvol.scene.image import image_from_array, read_image
-from clvol.scene.materials import Bitmap, Checkerboard, Roughness, Texture
+from clvol.scene.materials import Bitmap, Checkerboard, Roughness, Texture, VolumeTexture
+from clvol.scene.medium import own_volume, sane
 from clvol.scene.nodes import Node
 from clvol.scene.reader import BRIGHTEST
+from clvol.scene.records import ConstVolume, GridVolume
+from clvol.scene.volume import largest_value, limited
+from clvol.volumes import check_coefficients
 
 if TYPE_CHECKING:
     from clvol.scene.reader import Reader
@@ -68,6 +72,17 @@ def checkerboard(reader: Reader) -> Checkerboard:
     return Checkerboard(color0, color1, _to_uv(reader))
 
 
+def volume(reader: Reader) -> Texture:
+    """The `volume` plugin: what its volume holds at the points of the surface, in the world."""
+    looked_up = sane(reader, own_volume(reader, "volume", "a volume"))
+    if isinstance(looked_up, ConstVolume):
+        return looked_up.value
+    check_coefficients(looked_up.grid, "the volume of a texture")
+    if (largest := largest_value(looked_up)) > BRIGHTEST:
+        reader.fail(f"a texture's values are at most {BRIGHTEST:g}, the volume reaches {largest:g}", "volume")
+    return VolumeTexture(looked_up)
+
+
 def texture(reader: Reader, name: str, default: float, maximum: float = 1.0) -> Texture:
     """Parameter `name`: a number, rgb or spectrum in [0, maximum], or a texture.
 
@@ -83,6 +98,10 @@ def texture(reader: Reader, name: str, default: float, maximum: float = 1.0) -> 
     if not found:
         reader.refuse_plugin(name, "a number, an rgb, a spectrum or a texture")
     picture: Texture = reader.build(found[0][1])
+    if isinstance(picture, VolumeTexture) and maximum < largest_value(picture.volume) <= maximum + NEGLIGIBLE:
+        cut = limited(picture.volume, maximum)
+        assert isinstance(cut, GridVolume)
+        return VolumeTexture(cut)
     if maximum <= BRIGHTEST and (fault := _beyond(picture, maximum)):
         reader.fail(f"'{name}' of {reader.kind} '{reader.type}': {fault}", name)
     return picture
@@ -94,6 +113,10 @@ def _beyond(picture: object, maximum: float) -> str:
         return check_texels(picture.pixels, maximum)
     if isinstance(picture, Checkerboard) and max(*picture.color0, *picture.color1) > maximum:
         return f"colors must be in [0, {maximum:g}]"
+    if isinstance(picture, VolumeTexture) and (largest := largest_value(picture.volume)) > maximum:
+        return f"values must be in [0, {maximum:g}], the volume reaches {largest:.9g}"
+    if isinstance(picture, tuple) and max(picture) > maximum:  # of a constvolume
+        return f"values must be in [0, {maximum:g}], the volume has {max(picture):.9g}"
     return ""
 
 
@@ -118,8 +141,8 @@ def roughness(reader: Reader, name: str, default: Roughness) -> Roughness:
         return default
     if reader.is_value(name):
         return reader.number(name, 0.0, minimum=0.0)
-    found: Roughness = texture(reader, name, 0.0)  # type: ignore[assignment]  # no colour, since it is no value
-    return found
+    found = texture(reader, name, 0.0)
+    return float(np.mean(found)) if isinstance(found, tuple) else found  # a colour of a constvolume
 
 
 def constant(reader: Reader, name: str, default: float, minimum: float) -> float:

@@ -24,7 +24,6 @@ LATER: dict[str, tuple[str, ...]] = {
         *("pplastic", "polarizer", "retarder", "circular"),
     ),
     "phase": ("sggx",),
-    "texture": ("volume",),
 }
 """Kind -> plugins known by name and not supported in this version."""
 

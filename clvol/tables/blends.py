@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.scene.materials import Bitmap, Checkerboard
+from clvol.scene.materials import Varied
 from clvol.scene.sides import mixed_parts
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def blend_entries(
 def _row(material: int, factors: tuple[Factor, ...], textures: TextureTable) -> list[float]:
     share, varied = 1.0, []
     for weight, rest in factors:
-        if isinstance(weight, Bitmap | Checkerboard):
+        if isinstance(weight, Varied):
             texture = textures.add(weight, as_number=True)
             varied.append(-1 - texture if rest else texture)
         else:

@@ -18,7 +18,7 @@ from clvol.tables.environment import envmap_distribution
 from clvol.tables.textures import lamp_textures, mean_radiance, projector_frame, slide
 
 if TYPE_CHECKING:
-    from clvol.scene.materials import Bitmap, Checkerboard, Texture
+    from clvol.scene.materials import Texture, Varied
     from clvol.tables.surfaces import Surfaces
 
 RANDOM_STEPS = 2.0**32
@@ -40,7 +40,7 @@ class LightTable(NamedTuple):
     faces: np.ndarray
     cdf: np.ndarray
     of_shape: np.ndarray
-    textures: list[Bitmap | Checkerboard]
+    textures: list[Varied]
 
 
 def emitter_order(scene: records.Scene) -> list[records.Emitter]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from clvol import layout
 from clvol.scene import materials
-from clvol.scene.materials import Bitmap, Bsdf, Checkerboard, Texture
+from clvol.scene.materials import Bsdf, Texture, Varied
 from clvol.scene.sides import Look, Mixture, Side, bsdf_sides, side_kind
 from clvol.tables.bends import bend_entries
 from clvol.tables.blends import blend_entries
@@ -23,7 +23,7 @@ from clvol.tables.colours import rgb
 from clvol.tables.textures import TextureTable, mean_color
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
 BLACK = -1
 """Number of the material that absorbs everything: the back of what has only a front."""
@@ -44,17 +44,19 @@ class MaterialTable:
     sides: np.ndarray
 
 
-def material_table(bsdfs: Sequence[Bsdf], lamps: Sequence[Bitmap | Checkerboard] = ()) -> MaterialTable:
+def material_table(
+    bsdfs: Sequence[Bsdf], lamps: Sequence[Varied] = (), volumes: Mapping[int, int] | None = None
+) -> MaterialTable:
     """Materials of `bsdfs`, those of a scene's shapes in their order; each object gives its records once.
 
-    `lamps`: the textures of lights, which are the first ones.
+    `lamps`: the textures of lights, which are the first ones.  `volumes`: numbers of grid volumes, by id().
 
     Raises
     ------
     ValueError
         Records nested as the loader never nests them (see `bsdf_sides`).
     """
-    textures = TextureTable()
+    textures = TextureTable(volumes)
     for picture in lamps:
         textures.add(picture)
     tables: list[np.ndarray] = []
@@ -96,7 +98,7 @@ def _record(side: Side, textures: TextureTable, tables: list[np.ndarray]) -> np.
     record["kind"] = layout.enum("MATERIAL", kind)
     record["opacity"], record["opacity_texture"] = 1.0, -1
     for opacity in side.opacities:
-        if isinstance(opacity, Bitmap | Checkerboard):
+        if isinstance(opacity, Varied):
             record["opacity_texture"] = textures.add(opacity, as_number=True)
         else:
             record["opacity"] *= np.mean(opacity)
@@ -121,7 +123,7 @@ def _record(side: Side, textures: TextureTable, tables: list[np.ndarray]) -> np.
             alpha = bsdf.alpha if isinstance(bsdf, materials.RoughPlastic) else getattr(bsdf, field)
             record[field] = (
                 -1 - textures.add(alpha, as_number=True)
-                if isinstance(alpha, Bitmap | Checkerboard)
+                if isinstance(alpha, Varied)
                 else max(alpha, MIN_ALPHA)
             )
     if isinstance(bsdf, materials.Plastic | materials.RoughPlastic):
@@ -166,16 +168,14 @@ def _set_principled(record: np.ndarray, side: Side, textures: TextureTable, tabl
     }
     numbers = [rates[name] if name in rates else getattr(bsdf, name, 0.0) for name in layout.PRINCIPLED]
     rows = [
-        (0.0, textures.add(number, as_number=True))
-        if isinstance(number, Bitmap | Checkerboard)
-        else (np.mean(number), -1)
+        (0.0, textures.add(number, as_number=True)) if isinstance(number, Varied) else (np.mean(number), -1)
         for number in numbers
     ]
     _add_table(record, np.array(rows).reshape(-1), tables)
 
 
 def _set_color(record: np.ndarray, field: str, color: Texture, textures: TextureTable) -> None:
-    if isinstance(color, Bitmap | Checkerboard):
+    if isinstance(color, Varied):
         record[f"{field}_texture"] = textures.add(color)
     else:
         record[field], record[f"{field}_texture"] = rgb(color), -1

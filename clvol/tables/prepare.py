@@ -11,6 +11,7 @@ from clvol.planning.plan import Plan
 from clvol.planning.refusals import refuse_fine_step
 from clvol.planning.settled import Settled
 from clvol.scene.boundaries import scene_sphere
+from clvol.scene.material_facts import texture_volumes
 from clvol.scene.medium_facts import Matter, number_matter
 from clvol.scene.thinness import check_thinness
 from clvol.tables.apart import channels_apart, depth_across
@@ -134,7 +135,8 @@ class _Kept:
         check_camera_medium(scene, found)
         check_thinness(scene, found)
         centre, radius = scene_sphere(scene, found)
-        matter = number_matter([entry.medium for entry in found.entries])
+        shown = [v for n in found.surfaces for v in _shown_volumes(scene.shapes[n])]
+        matter = number_matter([entry.medium for entry in found.entries], shown)
         for medium in matter.media:
             check_cover(medium)
         known = () if before is None else before.volumes
@@ -166,6 +168,10 @@ class _Kept:
         if self.latest is None or self.latest[0] != needs:
             self.latest = needs, choose_majorants(self.matter, self.volumes, needs)
         return self.latest[1]
+
+
+def _shown_volumes(shape: Shape) -> list[GridVolume]:
+    return texture_volumes(shape.bsdf, shape.emission)
 
 
 def _others(scene: Scene) -> tuple[object, ...]:

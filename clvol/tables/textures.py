@@ -10,17 +10,24 @@ import numpy as np
 from clvol import layout
 from clvol.base.rows import bands
 from clvol.errors import SceneError
-from clvol.scene.materials import Bitmap, Checkerboard, MeshAttribute, Texture
-from clvol.tables.colours import luminance, rgb
+from clvol.scene.materials import Bitmap, Checkerboard, MeshAttribute, Texture, Varied, VolumeTexture
+from clvol.tables.colours import LUMINANCE, luminance, rgb
+from clvol.tables.volumes import first_sample
+from clvol.volumes.grid import DenseGrid, Grid
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from clvol.scene.records import ProjectorEmitter, SpotEmitter
 
 
 def mean_color(texture: Texture) -> float:
-    """Mean of a texture over its unit square and its channels; a bitmap's by luminance, as in Mitsuba."""
+    """Mean of a texture over its unit square and its channels; a bitmap's by luminance, as in Mitsuba.
+
+    That of a volume is about the mean of all of it: surfaces may show any part.
+    """
+    if isinstance(texture, VolumeTexture):
+        return float(np.mean(_grid_mean(texture.volume.grid)))
     if isinstance(texture, Bitmap):
         return float(luminance(texture.pixels.mean((0, 1), dtype=np.float64)))
     if isinstance(texture, Checkerboard):
@@ -35,14 +42,28 @@ def mean_radiance(texture: Texture) -> np.ndarray:
         mean = texture.pixels.mean((0, 1), dtype=np.float64)
     elif isinstance(texture, Checkerboard):
         mean = np.mean([rgb(texture.color0), rgb(texture.color1)], axis=0)
+    elif isinstance(texture, VolumeTexture):
+        mean = np.broadcast_to(_grid_mean(texture.volume.grid), 3)
     else:
         mean = rgb(texture)
     return mean
 
 
-def lamp_textures(emissions: Iterable[Texture | None]) -> list[Bitmap | Checkerboard]:
+def _grid_mean(grid: Grid) -> np.ndarray:
+    """Mean of the samples, float64 (1,) or (3,); of a sparse grid, of all values that it stores."""
+    mean: np.ndarray
+    if isinstance(grid, DenseGrid):
+        mean = grid.values.mean((0, 1, 2), dtype=np.float64)
+    else:
+        stored = (grid.leaf_values, grid.tile_values, grid.background)
+        rows = [values.reshape(-1, grid.channels) for values in stored if values.size]
+        mean = np.mean([one.mean(0, dtype=np.float64) for one in rows], axis=0)
+    return mean
+
+
+def lamp_textures(emissions: Iterable[Texture | None]) -> list[Varied]:
     """The textures of area lights, each once, in the order in which they come before all others."""
-    return list(dict.fromkeys(e for e in emissions if isinstance(e, Bitmap | Checkerboard)))
+    return list(dict.fromkeys(e for e in emissions if isinstance(e, Varied)))
 
 
 def slide(spot: SpotEmitter) -> Bitmap | Checkerboard | None:
@@ -85,9 +106,13 @@ def device_frame(n: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 class TextureTable:
-    """Collects TEXTURE `records` and their `texels`, float32 (count, 3) each."""
+    """Collects TEXTURE `records` and their `texels`, float32 (count, 3) each.
 
-    def __init__(self) -> None:
+    volumes : numbers of grid volumes, by their id().
+    """
+
+    def __init__(self, volumes: Mapping[int, int] | None = None) -> None:
+        self._volumes = volumes or {}
         self.records: list[np.ndarray] = []
         self.texels: list[np.ndarray] = []
         self._numbers: dict[tuple[Texture, bool], int] = {}
@@ -106,11 +131,13 @@ class TextureTable:
             self.records.append(self._record(varied, as_number))
         return self._numbers[key]
 
-    def _record(self, texture: Bitmap | Checkerboard, as_number: bool) -> np.ndarray:
+    def _record(self, texture: Varied, as_number: bool) -> np.ndarray:
         if isinstance(texture, MeshAttribute):
             what = f"the mesh_attribute '{texture.name}' stands where no mesh gives it a value"
             raise SceneError(what, hint="attributes are for the BSDFs of shapes")
         record = np.zeros((), layout.TEXTURE)
+        if isinstance(texture, VolumeTexture):
+            return self._of_volume(record, texture, as_number)
         record["to_uv"] = texture.to_uv[:2].reshape(-1)
         if isinstance(texture, Checkerboard):
             record["kind"] = layout.enum("TEXTURE", "CHECKERBOARD")
@@ -124,6 +151,17 @@ class TextureTable:
         record["wrap"] = layout.enum("WRAP", texture.wrap_mode)
         record["size"] = width, height
         record["first"] = self._add_texels(texture.pixels, as_number)
+        return record
+
+    def _of_volume(self, record: np.ndarray, texture: VolumeTexture, as_number: bool) -> np.ndarray:
+        """Of one that looks up a volume; a sparse grid has its background beyond its box."""
+        volume = texture.volume
+        record["kind"], record["first"] = layout.enum("TEXTURE", "VOLUME"), self._volumes[id(volume)]
+        record["wrap"] = layout.enum("WRAP", volume.wrap_mode)
+        if isinstance(volume.grid, DenseGrid):
+            record["to_uv"] = (*first_sample(volume), *volume.grid.values.shape[2::-1])
+        if as_number and volume.grid.channels == 3:
+            record["color0"] = LUMINANCE
         return record
 
     def _add_texels(self, pixels: np.ndarray, as_number: bool) -> int:

@@ -55,16 +55,19 @@ def prepare_volume(
     volume: records.GridVolume, centre: np.ndarray, bricks: BrickMap | BrickTree | None = None
 ) -> PreparedVolume:
     """Build a volume's bricks, or take those of its grid; `centre`: the world position that is the origin."""
-    grid, shift = volume.grid, np.zeros(3)
-    if volume.wrap_mode == "repeat" and isinstance(grid, DenseGrid):
-        shift = np.full(3, -1.0)
-        if bricks is None:
-            wrapped = np.pad(grid.values, [(1, 1), (1, 1), (1, 1), (0, 0)], mode="wrap")
-            grid = replace(grid, values=wrapped)
+    grid, shift = volume.grid, -first_sample(volume)
+    if shift.any() and bricks is None and isinstance(grid, DenseGrid):
+        wrapped = np.pad(grid.values, [(1, 1), (1, 1), (1, 1), (0, 0)], mode="wrap")
+        grid = replace(grid, values=wrapped)
     bricks = bricks or build_bricks(grid)
     to_brick = np.eye(4)
     to_brick[:3, 3] = -(np.array(bricks.origin) + shift)
     return PreparedVolume(volume, bricks, to_brick @ from_centred(volume.index_to_world, centre))
+
+
+def first_sample(volume: records.GridVolume) -> np.ndarray:
+    """Where a volume's bricks have its first sample, float64 (3,): dense ones that repeat begin before it."""
+    return np.full(3, float(volume.wrap_mode == "repeat" and isinstance(volume.grid, DenseGrid)))
 
 
 def check_cover(medium: records.Medium) -> None:

@@ -410,6 +410,7 @@ PARAMETERS = {
         },
     ),
     "mesh_attribute": ({"name": "vertex_a"}, {"name": "face_a", "scale": 0.5}),
+    "volume": ({"volume": VOLUME}, {"volume": VOLUME | {"data": CELLS / 2}}),
     "checkerboard": ({}, {"color0": RGB, "color1": RGB, "to_uv": UV}),
 }
 INSTEAD = {

@@ -69,6 +69,7 @@ MITSUBAS = {
     "constvolume": "to_world value",
     "gridvolume": "accel data filename filter_type grid max_value raw to_world use_grid_bbox wrap_mode",
     "bitmap": "accel bitmap filename filter_type format raw to_uv wrap_mode",
+    "volume": "volume",
     "checkerboard": "color0 color1 to_uv",
     "path": "block_size hide_emitters max_depth rr_depth samples_per_pass timeout",
     "volpath": "block_size hide_emitters max_depth rr_depth samples_per_pass timeout",

@@ -182,7 +182,6 @@ def test_a_texture_used_twice_is_one():
         ({"type": "checkerboard", "to_uv": MOVED.T}, "last row of 0 0 1"),
         ({"type": "checkerboard", "color0": 1.5}, r"in \[0, 1\]"),
         ({"type": "checkerboard", "color0": {"type": "checkerboard"}}, "no texture in a texture"),
-        ({"type": "volume"}, "not supported in this version"),
         ({"type": "plastic"}, "a texture"),
     ],
 )

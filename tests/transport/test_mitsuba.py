@@ -39,6 +39,7 @@ PICTURES = {
     "meshes": ("meshes", {}, 32, 4096),
     "coats": ("coats", {}, 64, 2048),
     "shapes": ("shapes", {}, 64, 4096),
+    "solids": ("solids", {}, 64, 2048),
     "curves": ("curves", {}, 64, 1024),
     "attributes": ("attributes", {}, 64, 1024),
     "lamps": ("lamps", {}, 64, 2048),

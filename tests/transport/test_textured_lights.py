@@ -48,7 +48,14 @@ def sphere(u, v):
 
 
 BALL = clvol.translate([0.2, 0.4, 1.2]) @ clvol.rotate([1, 1, 0], 40.0) @ clvol.scale(0.5)
+CELLS = {  # the bitmap's texels, as cells of a volume round the rectangle
+    "type": "gridvolume",
+    "data": PIXELS[None],
+    "filter_type": "nearest",
+    "to_world": DOWN @ clvol.translate([-1, -1, -0.5]) @ clvol.scale([2, 2, 1]),
+}
 LIGHTS = {
+    "volume": ("rectangle", DOWN, {"type": "volume", "volume": CELLS}, bitmap_at, rectangle),
     "rectangle": ("rectangle", DOWN, BITMAP, bitmap_at, rectangle),
     "disk": ("disk", DOWN, BOARD, board_at, disk),
     "sphere": ("sphere", BALL, BOARD, board_at, sphere),
