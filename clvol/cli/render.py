@@ -184,11 +184,11 @@ def render(
     quiet: bool,
     **options: Any,
 ) -> None:
-    """Render SCENE, a Mitsuba 3 XML file or a volume, into one or more pictures.
+    """Render SCENE, a Mitsuba 3 XML file, a .pbrt file or a volume, into one or more pictures.
 
-    A volume (.vdb, .vol, .npy, .npz, and what the extra `science` reads) is framed, scaled so that it reads
-    well, and lit; what was chosen is printed. Ctrl-C ends the render early and keeps the picture so far, and
-    so do SIGTERM and SIGHUP.
+    A volume (.vdb, .nvdb, .vol, .npy, .npz, and what the extra `science` reads) is framed, scaled so that it
+    reads well, and lit; what was chosen is printed. Ctrl-C ends the render early and keeps the picture so
+    far, and so do SIGTERM and SIGHUP.
     """
     from clvol.api.extent import check_alone
     from clvol.base.progress import error_console

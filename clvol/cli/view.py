@@ -92,7 +92,7 @@ def view(
     no_browser: bool,
     **options: Any,
 ) -> None:
-    """Look at SCENE, a Mitsuba 3 XML file or a volume, in the browser.
+    """Look at SCENE, a Mitsuba 3 XML file, a .pbrt file or a volume, in the browser.
 
     Drag turns it, drag with shift or the right button moves it, the wheel zooms. The picture refines while
     nothing changes. The page has knobs for density, light and exposure, and the command that renders what is
