@@ -13,6 +13,10 @@
 #include "core/random.h"
 #include "core/scene.h"
 
+/* The order that each block's points are dealt to parts in, two bits each. */
+#define BLOCK_ORDERS \
+    (2u << 2 * BLOCK_CAMERA | 0u << 2 * BLOCK_WALK | 2u << 2 * BLOCK_LIGHT | 2u << 2 * BLOCK_DIRECTION | \
+     0u << 2 * BLOCK_SHADOW | 1u << 2 * BLOCK_SURFACE | 1u << 2 * BLOCK_GLOW)
 #define SOBOL_SHUFFLED 0x3FFu /* samples are put in another order within runs of so many and one */
 
 /* Owen's nested uniform scrambling of a number whose bits x has in reverse: a bit is flipped by a function of the
@@ -36,11 +40,14 @@
         x ^= x * 0x8D22F6E6u; \
         return x; \
     } \
-    /* Which of the four points of a turn a part takes: one of three orders, so that two blocks pair the halves of     \
-       their numbers in different ways twice out of three times. */ \
-    INLINE Bits part_in_turn(Bits part, Bits hash) \
+    /* Which of the four points of a turn a part takes.  The three orders pair the halves of the numbers in three ways. \
+       Where numbers of two blocks decide together, parts covary by the product of their covariances in each block:     \
+       positively if both pair alike, else negatively, which lowers the variance of all parts together.  So blocks that \
+       meet around a scattering differ: the flight to it, its light, its direction and the next flight. */ \
+    INLINE Bits part_in_turn(Bits part, Bits bounce, Bits block, Bits segment) \
     { \
-        return ((Bits)(0x9C78E4u) >> (8u * (hash % 3u) + 2u * part)) & 3u; \
+        const Bits order = 2u * bounce + segment + (((Bits)(BLOCK_ORDERS) >> (2u * block)) & 3u); \
+        return ((Bits)(0x9C78E4u) >> (8u * (order % 3u) + 2u * part)) & 3u; \
     }
 DEFINE_SCRAMBLE(reverse_bits, owen_scramble, part_in_turn, uint)
 #if CLVOL_LANES
@@ -77,7 +84,8 @@ INLINE uint4 decision_block(const Scene *scene, SampleKey key, uint block, uint 
     const uint hash = mixed_bits(key.pixel ^ place);
     const uint order = reverse_bits(owen_scramble(reverse_bits(index), hash));
     const uint turn = (order & SOBOL_SHUFFLED) | (index & ~SOBOL_SHUFFLED);
-    uint4 point = sobol_point(scene, CLVOL_JOINT ? turn * CLVOL_RANDOMIZATIONS + part_in_turn(part, hash) : turn);
+    const uint dealt = turn * CLVOL_RANDOMIZATIONS + part_in_turn(part, key.bounce, block, segment);
+    uint4 point = sobol_point(scene, CLVOL_JOINT ? dealt : turn);
     if (block == BLOCK_LIGHT || block == BLOCK_SURFACE)
         point = point.zxyw; /* the best pair is for a light's point, or the direction */
     const uint4 scramble = philox4x32((uint4)(key.pixel, randomization, number, segment), seed);
@@ -97,7 +105,8 @@ INLINE BitsBlock lane_decisions(const Scene *scene, const LaneKeys *keys, Bits b
     const Bits hash = mixed_lanes(keys->pixel ^ mixed_lanes(number ^ (segment << 16) ^ seeds));
     const Bits order = reverse_lanes(owen_scramble_lanes(reverse_lanes(index), hash));
     const Bits turn = (order & SOBOL_SHUFFLED) | (index & ~SOBOL_SHUFFLED);
-    Bits left = CLVOL_JOINT ? turn * CLVOL_RANDOMIZATIONS + lane_part_in_turn(part, hash) : turn;
+    const Bits dealt = turn * CLVOL_RANDOMIZATIONS + lane_part_in_turn(part, keys->bounce, block, segment);
+    Bits left = CLVOL_JOINT ? dealt : turn;
     const Bits none = (Bits)(0u);
     BitsBlock point = {none, none, none, none};
     __global const uint *digits = scene->sobol;

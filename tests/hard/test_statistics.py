@@ -3,9 +3,9 @@
 All pixels look along one ray, so that each is a render of the same number by numbers of its own; that number
 is known (`clvol.lab.hard`).  Seeds are fixed, and each test raises a false alarm with probability 1e-4 or so.
 
-Of sampler `joint` the variance is that of four parts which depend on each other.  Where they make each other
-more even it is too large.  Here a flight and the walk of a shadow ray, of different blocks, decide together,
-and from 16 samples on it is too small by a fifth: `JOINT_LEAST`, which docs/methods.md tells.
+Of sampler `joint` the variance is that of four parts which depend on each other, so that it is too large:
+they make each other more even.  Here a flight and the walk of a shadow ray, of different blocks, decide together:
+that the two pair their points differently (`part_in_turn` in cl/core/sobol.h) keeps it from being too small.
 """
 
 import functools
@@ -22,8 +22,6 @@ from clvol.lab.hard.places import AHEAD, EYE, LUMPS
 
 SIZE, SEEDS = 48, 3
 BLOCK = Block(LUMPS, (1.0,), np.eye(4))
-JOINT_LEAST = 0.75
-"""Least share of a variance that sampler `joint` may tell, measured at 0.79."""
 TRUTH = float(scenes.scattered([BLOCK], EYE, AHEAD)[0])
 
 
@@ -65,11 +63,16 @@ def test_the_noise_is_the_scatter_over_seeds(sampler, spp):
     assert abs(ratio - 1) < largest_z(8) * error
 
 
-@pytest.mark.parametrize("spp", [2, 3, 5, 16])
-def test_the_noise_of_joint_samples_is_rarely_told_too_small_and_never_by_much(spp):
+@pytest.mark.parametrize("spp", [2, 3, 5, 16, 64])
+def test_the_noise_of_joint_samples_is_not_told_too_small(spp):
     ratio, error = ratio_of_variances("joint", spp)
-    assert ratio - 4 * error > JOINT_LEAST
-    assert spp > 5 or ratio > 1.2
+    assert ratio - largest_z(5) * error > 1.2
+
+
+def test_joint_samples_are_the_better_for_it():
+    """Parts that pair flights and shadow rays alike have more variance than parts that do not know of it."""
+    joint, apart = (np.mean((pictures(sampler, 16)[0] - TRUTH) ** 2) for sampler in ("joint", "sobol"))
+    assert joint < 0.8 * apart
 
 
 @pytest.mark.parametrize("sampler", ["independent", "sobol", "joint"])
@@ -95,7 +98,7 @@ def test_intervals_cover_as_often_as_they_say(sampler, spp):
     within = np.abs(mean - TRUTH) < stats.t.ppf(0.975, np.maximum(freedom, 1)) * error
     expected = 0.95
     spread = largest_z(9) * np.sqrt(expected * (1 - expected) / within.size)
-    assert within.mean() > expected - spread - 0.03 * (sampler == "joint")
+    assert within.mean() > expected - spread
     if sampler != "joint":
         assert within.mean() < expected + spread + 0.01
 

@@ -224,14 +224,38 @@ def test_decisions_of_different_blocks_meet_at_random(probe, count):
 
 @pytest.mark.parametrize("count", [4, 16, 64])
 def test_decisions_of_different_blocks_meet_at_random_in_all_parts_together(joint, count):
-    """Once in three times the halves of two numbers are paired alike for eight samples, else evenly."""
+    """The halves of two numbers are paired alike for eight samples at most."""
     joint.upload()
     pixels = np.arange(1500)[:, None]
     drawn = [blocks(joint, pixels, np.arange(count), **place) for place in PLACES]
-    error = np.sqrt(8 / pixels.size)  # kurtosis 9: a normal number once in three times, else 0
+    error = np.sqrt(2 / pixels.size)
     for one, other in combinations(drawn, 2):
         for m, n in np.ndindex(4, 4):
-            assert imbalance(one[..., m], other[..., n]) < 8 / 3 * (1 + 6 * error)
+            assert imbalance(one[..., m], other[..., n]) < 8 * (1 + 6 * error)
+
+
+@pytest.mark.parametrize("bounce", [0, 1, 2, 3, 70])
+@pytest.mark.parametrize("count", [4, 16, 64])
+def test_what_meets_around_a_scattering_is_paired_evenly(joint, bounce, count):
+    """In the four points of a turn, no two of these numbers have their halves alike."""
+    joint.upload()
+    pixels = np.arange(200)[:, None]
+
+    def drawn(block, number, later=1):
+        place = {"block": block, "bounce": bounce + later}
+        return blocks(joint, pixels, np.arange(count), **place)[..., number]
+
+    flight, next_flight = drawn(WALK, 0, later=0), drawn(WALK, 0)
+    light, shadow, direction = drawn(LIGHT, 1), drawn(SHADOW, 0), drawn(DIRECTION, 0)
+    for one, other in [
+        (flight, light),
+        (flight, shadow),
+        (light, shadow),
+        (flight, direction),
+        (flight, next_flight),
+        (direction, next_flight),
+    ]:
+        assert imbalance(one, other) == 0
 
 
 # -- pictures ----------------------------------------------------------------------------------------
