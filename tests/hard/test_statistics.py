@@ -4,8 +4,9 @@ All pixels look along one ray, so that each is a render of the same number by nu
 is known (`clvol.lab.hard`).  Seeds are fixed, and each test raises a false alarm with probability 1e-4 or so.
 
 Of sampler `joint` the variance is that of four parts which depend on each other, so that it is too large:
-they make each other more even.  Here a flight and the walk of a shadow ray, of different blocks, decide together:
-that the two pair their points differently (`part_in_turn` in cl/core/sobol.h) keeps it from being too small.
+they make each other more even.  Here a flight and the walk of a shadow ray, of different blocks, decide
+together: that the two pair their points differently (`part_in_turn` in cl/core/sobol.h) keeps it from being
+too small.
 """
 
 import functools

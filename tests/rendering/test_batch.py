@@ -98,7 +98,7 @@ def test_samples_merge_and_a_render_goes_on(scene, tmp_path):
     assert further.samples == (0, 8)
     np.testing.assert_allclose(further.image, whole.image, rtol=1e-5)
     alone = clvol.render(scene, sensor=1, size=(18, 5), samples=(4, 4), seed=5, sampler="joint")
-    with pytest.raises(OptionError, match="different digest"):
+    with pytest.raises(OptionError, match="different scenes"):
         clvol.merge([first, alone])
 
 
