@@ -144,7 +144,8 @@ def _shape(reader: Reader, kind: str, to_world: np.ndarray, triangles: Mesh | No
     emission = _emission(reader)
     bsdf = reader.only_child("bsdf")
     inside = media.get("interior")
-    if bsdf is None and inside is not None and inside is not media.get("exterior"):
+    faulty = reader.library.faults.errors  # one may be that of a BSDF
+    if bsdf is None and inside is not None and inside is not media.get("exterior") and not faulty:
         log.warning(
             "%s: the shape has a medium but no BSDF, so it is diffuse and hides the medium; "
             'add <bsdf type="null"/> to look into it',

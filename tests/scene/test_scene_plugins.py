@@ -499,6 +499,12 @@ def test_shapes_are_diffuse_unless_told_otherwise(kind, caplog):
     assert "scene.s: the shape has a medium but no BSDF, so it is diffuse and hides the medium" in caplog.text
 
 
+def test_a_faulty_bsdf_is_not_told_to_be_missing(caplog):
+    bent = {"type": "bumpmap", "heights": {"type": "checkerboard"}, "nested": {"type": "null"}}
+    assert "no slope" in error_of(s={"type": "cube", "bsdf": bent, "interior": {"type": "homogeneous"}})
+    assert not caplog.text
+
+
 def test_an_area_emitter_makes_its_shape_a_light():
     light = {"type": "area", "radiance": {"type": "rgb", "value": [1, 2, 3]}}
     lamp = load(s={"type": "disk", "light": light}).shapes[0]
