@@ -205,6 +205,17 @@ def within() -> clvol.Scene:
     return clvol.load_dict(described | {"ball": ball})
 
 
+def plate() -> clvol.Scene:
+    """The irradiance of a box in fog."""
+    fog = {"type": "homogeneous", "sigma_t": 0.5, "albedo": 0.8}
+    meter = {"type": "irradiancemeter", "film": {"type": "hdrfilm", "width": 2, "height": 2}}
+    integrator = {"type": "volpath", "max_depth": 3}
+    described = {"type": "scene", "integrator": integrator, "sky": {"type": "constant"}, "fog": box(fog)}
+    return clvol.load_dict(
+        described | {"plate": {"type": "cube", "to_world": clvol.scale(0.2), "meter": meter}}
+    )
+
+
 def far_apart() -> clvol.Scene:
     """A sparse grid of which two distant corners hold something."""
     leaf = np.full((8, 8, 8), 0.2), np.ones((8, 8, 8), bool)
@@ -225,6 +236,7 @@ MADE = {
     "colours": colours,
     "flames": flames,
     "within": within,
+    "a meter": plate,
     "far apart": far_apart,
     "a backdrop": lambda: one_medium(backdrop=0.3),
     "transparent": lambda: one_medium(pixel_format="rgba"),

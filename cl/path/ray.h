@@ -16,7 +16,11 @@ INLINE float ray_limit(const Scene *scene, uint slot, Ray ray)
 {
     if (path_bounce(scene, slot) > 0)
         return INFINITY;
+#if CLVOL_HAS_METER
+    return INFINITY;
+#else
     return scene->render->camera_far / dot_of(ray.d, load_vector(scene->render->camera_forward));
+#endif
 }
 
 /* Where the segment of the ray ends that walks go along: at a surface, or, since beyond the far plane no boundary

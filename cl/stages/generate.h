@@ -3,6 +3,9 @@
 #define CLVOL_STAGES_GENERATE_H
 #include "path/draws.h"
 #include "path/reset.h"
+#if CLVOL_HAS_METER
+#include "stages/meter.h"
+#endif
 #include "path/transitions.h"
 
 #define DRAWS_DIRECTION 0
@@ -14,7 +17,11 @@ INLINE void write_result(const Scene *scene, uint slot, uint job)
 {
     const uint ring_jobs = scene->render->pass_jobs * scene->render->ring_passes;
     const uint place = job % ring_jobs;
+#if CLVOL_HAS_METER
+    const Spectrum radiance = PI * path_sample_weight(scene, slot) * path_radiance(scene, slot); /* an irradiance */
+#else
     const Spectrum radiance = path_sample_weight(scene, slot) * path_radiance(scene, slot);
+#endif
 #if CLVOL_SPECTRUM == 1
     scene->results[place] = radiance;
 #else
@@ -66,6 +73,7 @@ INLINE float filter_offset(const Scene *scene, uint k, int pixel, int pixels, fl
 #endif
 }
 
+#if !CLVOL_HAS_METER
 /* Starts the camera ray of film position (x, y); u and v place it on the lens, uniformly over its disk. */
 INLINE void set_camera_ray(const Scene *scene, uint slot, float x, float y, float u, float v)
 {
@@ -83,6 +91,7 @@ INLINE void set_camera_ray(const Scene *scene, uint slot, float x, float y, floa
     set_path_origin(scene, slot, origin);
     set_path_direction(scene, slot, unit_of(towards));
 }
+#endif
 
 /* Which numbers the path of a job reads. */
 INLINE SampleKey job_key(const Scene *scene, uint job)
@@ -113,7 +122,11 @@ INLINE void start_job(const Scene *scene, uint slot, uint job, const Draws *draw
     float weight = 1.0f;
     const float x = (float)px + filter_offset(scene, k.x, px, width, &weight);
     const float y = (float)py + filter_offset(scene, k.y, py, scene->render->film_size[1], &weight);
+#if CLVOL_HAS_METER
+    set_meter_ray(scene, slot, x - (float)px, y - (float)py, uniform_below_one(k.z), uniform_float(k.w));
+#else
     set_camera_ray(scene, slot, x, y, uniform_float(k.z), uniform_float(k.w));
+#endif
     set_path_sample_weight(scene, slot, weight);
     set_path_channel(scene, slot, job % CLVOL_JOBS_PER_SAMPLE);
     set_path_beta(scene, slot, (Spectrum)(1.0f));

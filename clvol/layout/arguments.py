@@ -69,6 +69,7 @@ ARGUMENTS = (
     Argument("env_texels", "__global const float *", "CLVOL_HAS_ENVMAP"),
     Argument("env_marginal", "__global const float *", "CLVOL_HAS_ENVMAP"),
     Argument("env_conditional", "__global const float *", "CLVOL_HAS_ENVMAP"),
+    Argument("meter", "__global const MeterFace *", "CLVOL_HAS_METER", rare=True),
     Argument("filter_cdf", "__global const float *", "CLVOL_HAS_FILTER_TABLE"),
 )
 """State and queues first, then what the scene holds."""

@@ -96,6 +96,17 @@ EMITTER = _record(
     ("count", "u", 1),  # of its primitives, which follow each other
 )
 
+METER_FACE = _record(
+    ("kind", "u", 1),  # METER_TRIANGLE, or METER_SPHERE and so on of the one face that is the shape
+    ("count", "u", 1),  # of all faces
+    ("cdf", "f", 1),  # share of the area that this face and those before it have
+    ("side", "f", 1),  # of a sphere or cylinder: 1, or -1 where it measures inwards
+    ("place", "f", 3),  # a corner, or the middle of a sphere or disk, or of a cylinder's lower end
+    ("x", "f", 3),  # two edges, or the axes of the shape's space
+    ("y", "f", 3),
+    ("z", "f", 3),  # the third, or the unit normal of a triangle or disk
+)
+
 LIGHT_CACHE = _record(
     ("lower", "f", 3),  # corners of the grid
     ("upper", "f", 3),
@@ -202,6 +213,7 @@ RECORDS = {
     "Transfer": TRANSFER,
     "Phase": PHASE,
     "Emitter": EMITTER,
+    "MeterFace": METER_FACE,
     "LightCache": LIGHT_CACHE,
     "Shape": SHAPE,
     "Quadric": QUADRIC,
@@ -211,7 +223,7 @@ RECORDS = {
     "Render": RENDER,
 }
 
-RARE_RECORDS = {"Glow": "CLVOL_HAS_GLOW"}
+RARE_RECORDS = {"Glow": "CLVOL_HAS_GLOW", "MeterFace": "CLVOL_HAS_METER"}
 """Records that few scenes have, and the macro that says so: what others compile does not hold them."""
 
 RARE_KINDS = {"TEXTURE_VOLUME": "CLVOL_HAS_VOLUME_TEXTURES"}
@@ -222,6 +234,7 @@ ENUMS = {
     "PHASE": ("ISOTROPIC", "HG", "RAYLEIGH", "TABPHASE"),
     "TRANSFER": ("SIGMA_T", "ALBEDO", "EMISSION"),  # in the order of a medium's entries
     "EMITTER": ("CONSTANT", "ENVMAP", "DIRECTIONAL", "POINT", "SPOT", "AREA", "SUN", "PROJECTOR"),
+    "METER": ("TRIANGLE", "SPHERE", "DISK", "CYLINDER"),
     "SURFACE": ("MESH", "SPHERE", "DISK", "CYLINDER"),
     "QUADRIC": ("SPHERE", "DISK", "CYLINDER"),
     "MATERIAL": BSDFS,

@@ -88,6 +88,7 @@ class Features:
     signed_filter: bool = False
     lens: bool = False
     parallel_rays: bool = False
+    meter: bool = False
     depth_limited: bool = False
     hide_emitters: bool = False
     hide_environment: bool = False

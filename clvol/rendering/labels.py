@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.picture.scenery import Scenery
-from clvol.scene.records import GridVolume, Meter
+from clvol.scene.records import GridVolume, IrradianceMeter, Meter
 from clvol.tables.camera import camera_rays
 from clvol.volumes.grid import DenseGrid
 
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 def scenery_of(prepared: PreparedScene) -> Scenery | None:
     """The camera and the one volume that has an extinction; None where there are none or several.
 
-    There are no labels of what is one pixel.
+    There are no labels of what a meter measures.
     """
-    if isinstance(prepared.scene.camera, Meter):
+    if isinstance(prepared.scene.camera, Meter | IrradianceMeter):
         return None
     volumes = {id(m.sigma_t): m for m in prepared.matter.media if isinstance(m.sigma_t, GridVolume)}
     if len(volumes) != 1:

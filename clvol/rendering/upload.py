@@ -24,6 +24,7 @@ from clvol.tables.light_cache import light_cache_record, rows
 from clvol.tables.lights import LightTable, envmap_arrays, light_table
 from clvol.tables.materials import material_table
 from clvol.tables.media import glow_table, medium_table
+from clvol.tables.meters import meter_faces
 from clvol.tables.phases import phase_table
 from clvol.tables.pixel_filter import filter_cdf
 from clvol.tables.sobol import block_table
@@ -51,6 +52,8 @@ def upload_scene(
         arrays["sobol"] = block_table(bool(prepared.plan.macros["CLVOL_JOINT"]))
     if "filter_cdf" in needed:
         arrays["filter_cdf"] = filter_cdf(prepared.scene.film.rfilter)
+    if isinstance(prepared.scene.camera, records.IrradianceMeter):
+        arrays["meter"] = meter_faces(prepared.scene.camera.shape, prepared.centre)
     buffers |= {name: there.put(name, array) for name, array in arrays.items()}
     if "light_cache" in needed:
         camera = device.memory.upload(render, "the camera")
@@ -65,7 +68,7 @@ def upload_scene(
     return buffers
 
 
-_NOT_OF_THE_CACHE = ("sobol", "filter_cdf")
+_NOT_OF_THE_CACHE = ("sobol", "filter_cdf", "meter")
 """Buffers that the cache of lights has nothing to do with."""
 
 

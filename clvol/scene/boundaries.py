@@ -248,6 +248,8 @@ def _starts_of_rays(sensor: records.Camera, film: records.Film) -> tuple[np.ndar
         return corners.min(axis=0) - aside, corners.max(axis=0) + aside
     if isinstance(sensor, records.Meter) and sensor.distant:
         return np.full(3, np.inf), np.full(3, -np.inf)  # outside of all
+    if isinstance(sensor, records.IrradianceMeter):
+        return shape_bounds(sensor.shape)
     eye = sensor.to_world[:3, 3]
     if isinstance(sensor, records.Meter):
         return eye, eye

@@ -187,6 +187,9 @@ def _scene_lines(scene: records.Scene) -> Iterator[str]:
 def _camera(sensor: records.Camera) -> str:
     position = _point(sensor.to_world[:3, 3])
     inside = f", in {_medium(sensor.medium)}" if sensor.medium else ""
+    if isinstance(sensor, records.IrradianceMeter):
+        name = f" {sensor.shape.name!r}" if sensor.shape.name else ""
+        return f"irradiance of the {sensor.shape.kind}{name}{inside}"
     if isinstance(sensor, records.Orthographic):
         width = _number(2 * float(np.linalg.norm(sensor.to_world[:3, 0])))
         return f"orthographic at {position}, {width} wide{inside}"

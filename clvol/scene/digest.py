@@ -16,6 +16,7 @@ _APART = (
     *("source", "files", "name", "names", "spp", "seed", "choices", "sensors", "component_format", "kept"),
     *("approximated", "left_out", "aovs"),  # the records tell
     *("sanitize", "repairs"),  # the samples tell
+    "meter",  # the sensor tells
 )
 """Fields that do not tell scenes apart."""
 

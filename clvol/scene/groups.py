@@ -52,6 +52,7 @@ def shapegroup(reader: Reader) -> ShapeGroup:
         shapes = shapes_of(reader.build(node))
         if any(shape.emission for shape in shapes):
             reader.fail("a shape in a shapegroup cannot emit", name, "put the light outside of the group")
+        _refuse_meters(reader, name, shapes)
         found += shapes
     return ShapeGroup(tuple(found))
 
@@ -78,9 +79,18 @@ def instance(reader: Reader) -> tuple[Shape, ...]:
 def merge(reader: Reader) -> tuple[Shape, ...]:
     """The `merge` plugin: the shapes in it, which Mitsuba joins to fewer meshes that look the same."""
     found: list[Shape] = []
-    for _, node in reader.children("shape"):
-        found += shapes_of(reader.build(node))
+    for name, node in reader.children("shape"):
+        shapes = shapes_of(reader.build(node))
+        _refuse_meters(reader, name, shapes)
+        found += shapes
     return tuple(found)
+
+
+def _refuse_meters(reader: Reader, name: str, shapes: tuple[Shape, ...]) -> None:
+    """No sensor is in the scene that is in a shape of a group."""
+    if any(shape.meter for shape in shapes):
+        hint = "put the shape into the scene"
+        reader.fail(f"a shape in a {reader.type} takes no irradiancemeter", name, hint)
 
 
 def shapes_of(record: ShapeRecord) -> tuple[Shape, ...]:

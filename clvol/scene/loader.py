@@ -58,6 +58,7 @@ PLUGINS: PluginTable = {
         "orthographic": sensor.orthographic,
         "radiancemeter": sensor.radiancemeter,
         "distant": sensor.distant,
+        "irradiancemeter": sensor.irradiancemeter,
         "batch": sensor.batch,
     },
     "film": {"hdrfilm": sensor.hdrfilm},
@@ -258,7 +259,10 @@ def load_sensor(given: Mapping[str, object]) -> tuple[Sensor, set[str]]:
     if (kind := library.kind_of(node)) != "sensor":
         raise SceneError(f"'{node.type}' is a {kind}, not a sensor", node.where)
     inside = (value for _, value in node.parameters() if isinstance(value, Node) and not value.is_value)
-    return build_whole(node, library), {library.kind_of(library.resolve(value)) for value in inside}
+    made = build_whole(node, library)
+    if not isinstance(made, Sensor):
+        raise SceneError("an irradiancemeter outside a shape measures nothing", node.where, sensor.IN_A_SHAPE)
+    return made, {library.kind_of(library.resolve(value)) for value in inside}
 
 
 def _of_xml(read: Callable[[Faults], Node], source: str = "") -> Scene:
@@ -294,7 +298,7 @@ def _build(root: Node, source: str, grids: Grids | None, faults: Faults, plugins
         raise SceneError(f"expected a scene, got a '{root.type}'", root.where)
     library = Library(root, plugins, grids, faults)
     records = _records(root, library)
-    sensors = tuple(replace(sensor, name=node.id) for node, sensor in records["sensor"])
+    sensors = _sensors(root, records, library)
     shapes = groups.all_shapes(record for _, record in records["shape"])
     emitters = _emitters(records["emitter"], library)
     chosen = Integrator()
@@ -348,6 +352,29 @@ def _records(root: Node, library: Library) -> dict[str, list[tuple[Node, Any]]]:
             if record is not None:
                 records.setdefault(kind, []).append((node, record))
     return records
+
+
+def _sensors(
+    root: Node, records: Mapping[str, list[tuple[Node, Any]]], library: Library
+) -> tuple[Sensor, ...]:
+    """The scene's sensors, those in its shapes too, in the order in which they stand there."""
+    found: list[tuple[Node, Sensor]] = []
+    for node, record in records["sensor"]:
+        if isinstance(record, Sensor):
+            found.append((node, replace(record, name=node.id)))
+        elif id(node) not in library.taken:
+            what = "an irradiancemeter outside a shape measures nothing"
+            library.faults.note(SceneError(what, node.where, sensor.IN_A_SHAPE))
+    for node, record in records["shape"]:
+        if isinstance(record, Shape) and record.meter is not None:
+            name = f"{record.name}.{record.meter.name or 'sensor'}" if record.name else record.meter.name
+            found.append((node, replace(record.meter.on(record), name=name)))
+    order = {
+        id(library.resolve(value)): n
+        for n, (_, value) in enumerate(root.parameters())
+        if isinstance(value, Node) and not value.is_value
+    }
+    return tuple(one for _, one in sorted(found, key=lambda pair: order.get(id(pair[0]), len(order))))
 
 
 def _emitters(records: list[tuple[Node, Any]], library: Library) -> list[tuple[Node, Any]]:

@@ -91,11 +91,12 @@ def _sensor(sensor: records.Sensor, seen: set[int]) -> Found:
 def _camera(camera: records.Camera, film: records.Film, seen: set[int]) -> Found:
     if isinstance(camera, records.Orthographic):
         yield "to_world", _field(camera, "to_world", values.matrix(values.invertible), values.frozen)
-    else:
+    elif not isinstance(camera, records.IrradianceMeter):  # which has its shape's
         yield "to_world", _field(camera, "to_world", values.matrix(values.rigid), values.frozen)
     if isinstance(camera, records.Perspective):
         yield from _perspective(camera, film)
-    for name in ("near_clip", "far_clip") if not isinstance(camera, records.Meter) else ():
+    meters = records.Meter | records.IrradianceMeter
+    for name in ("near_clip", "far_clip") if not isinstance(camera, meters) else ():
         yield name, _field(camera, name, values.number(0.0, exclusive=True))
     if camera.medium is not None:
         yield from _nested("medium", _medium(camera.medium, seen))

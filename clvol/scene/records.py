@@ -106,7 +106,23 @@ class Meter:
     medium: Medium | None = None
 
 
-Camera = Perspective | Orthographic | Meter
+@dataclass(frozen=True, eq=False)
+class IrradianceMeter:
+    """Pi times the mean of rays from all over a `shape`, by their cosine with its normals: its irradiance.
+
+    `medium`: as of the others.
+    """
+
+    shape: Shape
+    medium: Medium | None = None
+
+    @property
+    def to_world(self) -> np.ndarray:
+        """That of the shape."""
+        return self.shape.to_world
+
+
+Camera = Perspective | Orthographic | Meter | IrradianceMeter
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,6 +286,7 @@ class Shape:
     interior, exterior : media behind the surface and before it (the side its normals point to).
     emission : radiance of the front side, the same all over or a texture; None where the shape is no light.
     flip_normals : front and back change places.
+    meter : what it is measured by; the scene has it among its sensors.
     """
 
     kind: str
@@ -281,6 +298,7 @@ class Shape:
     flip_normals: bool = False
     mesh: Mesh | None = None
     name: str = ""
+    meter: ShapeMeter | None = None
 
 
 @dataclass(frozen=True)
@@ -416,6 +434,20 @@ class Sensor:
     film: Film
     sampler: Sampler
     name: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeMeter:
+    """An `irradiancemeter` that is in a shape, with its film and sampler."""
+
+    film: Film
+    sampler: Sampler
+    medium: Medium | None = None
+    name: str = ""
+
+    def on(self, shape: Shape) -> Sensor:
+        """The sensor that measures the shape's irradiance."""
+        return Sensor(IrradianceMeter(shape, self.medium), self.film, self.sampler, self.name)
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from clvol.scene.records import (
     Sampler,
     Sensor,
     Shape,
+    ShapeMeter,
 )
 from clvol.scene.transforms import frame, translate
 
@@ -32,6 +33,7 @@ MAX_PIXELS = 2**28
 FOV_AXES = ("x", "y", "diagonal", "smaller", "larger")
 BOX = ReconstructionFilter("box", 0.5, 0.0)
 """Of pictures in which filters make no difference."""
+IN_A_SHAPE = "put it into the shape whose irradiance it measures"
 _FILM_DIAGONAL_MM = float(np.hypot(36.0, 24.0))
 
 
@@ -104,6 +106,20 @@ def distant(reader: Reader) -> Sensor:
     return _meter(reader, Meter(to_world, True, target))
 
 
+def irradiancemeter(reader: Reader) -> ShapeMeter:
+    """The `irradiancemeter` plugin, which stands in a shape; its film may have any size, all of one mean."""
+    if reader.has("to_world"):
+        reader.fail("an irradiancemeter has the to_world of the shape that it is in", "to_world")
+    _shutter(reader)
+    film, sampler, medium = map(reader.only_child, ("film", "sampler", "medium"))
+    return ShapeMeter(
+        replace(reader.build(film) if film else Film(), rfilter=BOX),
+        reader.build(sampler) if sampler else Sampler(),
+        reader.build(medium) if medium else None,
+        reader.node.id,
+    )
+
+
 def _along(reader: Reader) -> np.ndarray:
     """A turn that takes local +z to `direction`, which is +z without."""
     direction = reader.vector("direction", (0.0, 0.0, 1.0))
@@ -163,7 +179,9 @@ def batch(reader: Reader) -> Sensor:
     """
     cameras, names = [], []
     for key, node in reader.children("sensor"):
-        inside: Sensor = reader.build(node)
+        inside: Sensor | ShapeMeter = reader.build(node)
+        if isinstance(inside, ShapeMeter):
+            reader.fail("a batch takes no irradiancemeter", key, IN_A_SHAPE)
         camera = inside.camera
         if isinstance(camera, Batch):
             reader.fail("a batch takes no other batch", key, "put its sensors into this one")

@@ -17,7 +17,8 @@ from clvol.scene.materials import Diffuse, FrontOnly
 from clvol.scene.mesh_arrays import read_arrays
 from clvol.scene.mesh_attributes import with_attributes
 from clvol.scene.mesh_files import read_mesh
-from clvol.scene.records import Medium, Mesh, Shape
+from clvol.scene.nodes import NAMELESS
+from clvol.scene.records import Medium, Mesh, Shape, ShapeMeter
 from clvol.scene.transforms import check_size, frame, keeps_angles, scale, translate
 
 if TYPE_CHECKING:
@@ -163,6 +164,7 @@ def _shape(reader: Reader, kind: str, to_world: np.ndarray, triangles: Mesh | No
         flip_normals=reader.boolean("flip_normals", False),
         mesh=triangles,
         name=reader.node.id,
+        meter=_meter(reader, kind, to_world, triangles),
     )
     if triangles is not None and triangles.uvs is None and (has_textures(made.bsdf) or needs_uvs(emission)):
         name = made.name or triangles.source
@@ -182,6 +184,23 @@ def _emission(reader: Reader) -> Texture | None:
         name = next(name for name, _ in reader.children("emitter"))
         reader.fail(f"a shape takes no emitter '{node.type}'", name, "area emitters go into shapes")
     return light.radiance
+
+
+def _meter(reader: Reader, kind: str, to_world: np.ndarray, triangles: Mesh | None) -> ShapeMeter | None:
+    """The `irradiancemeter` inside, if there is one."""
+    node = reader.only_child("sensor")
+    if node is None:
+        return None
+    name = reader.children("sensor")[0][0]
+    made = reader.build(node)
+    if not isinstance(made, ShapeMeter):
+        reader.fail(f"a shape takes no sensor '{node.type}'", name, "irradiancemeters go into shapes")
+    if triangles is not None and triangles.normals is not None:
+        what = "an irradiancemeter on a mesh with normals of its vertices"
+        reader.unsupported(what, name, "set face_normals, or leave its normals out")
+    if kind == "cylinder" and not stays_round(to_world):
+        reader.fail("a cylinder that is measured must not be stretched across or sheared", name)
+    return made if made.name or name.startswith(NAMELESS) else replace(made, name=name)
 
 
 def _media(reader: Reader) -> dict[str, Medium]:

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 LATER: dict[str, tuple[str, ...]] = {
     "integrator": ("depth", "stokes", "volprim_rf_basic", "multichannel", "vrl", "vpl", "ao"),
-    "sensor": ("irradiancemeter",),
     "film": ("specfilm",),
     "shape": ("sdfgrid", "ellipsoids", "ellipsoidsmesh", "heightfield"),
     "bsdf": (

@@ -17,8 +17,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clvol.scene.records import Meter, Orthographic, Shape
+from clvol.layout import enum
+from clvol.scene.records import IrradianceMeter, Meter, Orthographic, Shape
 from clvol.scene.sensor import field_of_view_x
+from clvol.tables.meters import meter_faces
 
 if TYPE_CHECKING:
     from clvol.scene.records import Camera, Film, Perspective
@@ -80,6 +82,8 @@ def camera_rays(sensor: Camera, film: Film, centre: np.ndarray, radius: float) -
     """
     if isinstance(sensor, Meter):
         return _meter_rays(sensor, centre, radius)
+    if isinstance(sensor, IrradianceMeter):
+        return _first_ray(sensor, centre)
     if isinstance(sensor, Orthographic):
         return _parallel_rays(sensor, film, centre, radius)
     return _perspective_rays(sensor, film, centre, radius)
@@ -109,6 +113,21 @@ def _meter_rays(sensor: Meter, centre: np.ndarray, radius: float) -> CameraRays:
         *(eye, position, dx, dy, forward, nothing, nothing, forward, np.inf),
         *(lens_x, lens_y, 1.0, 0.0),
         parallel=True,
+    )
+
+
+def _first_ray(sensor: IrradianceMeter, centre: np.ndarray) -> CameraRays:
+    """The ray that leaves an irradiancemeter in the middle of its first face; the device draws its own."""
+    face, nothing = meter_faces(sensor.shape, centre)[0], np.zeros(3)
+    inside = {"triangle": (1 / 3, 1 / 3), "sphere": (1.0, 0.0), "disk": (0.0, 0.0), "cylinder": (1.0, 0.0)}
+    x, y = list(inside.values())[face["kind"]]
+    out = x * face["x"].astype(float) + y * face["y"]
+    round_ = face["kind"] in (enum("METER", "sphere"), enum("METER", "cylinder"))
+    normal = face["side"] * out / np.linalg.norm(out) if round_ else face["z"].astype(float)
+    start = face["place"] + out + 1e-5 * float(np.linalg.norm(face["x"])) * normal
+    return CameraRays(
+        *(face["place"].astype(float), start, nothing, nothing, normal, nothing, nothing, normal, np.inf),
+        *(nothing, nothing, 1.0, 0.0),
     )
 
 

@@ -187,6 +187,7 @@ PARAMETERS = {
             **SHUTTER,
         },
     ),
+    "irradiancemeter": ({"film": PIXEL}, METER),
     "hdrfilm": (
         {"width": 8, "height": 9},
         {

@@ -7,7 +7,7 @@ import pyopencl as cl
 from probe import Probe, medium_of, scene_of
 
 from clvol import layout
-from clvol.scene.records import ConstVolume
+from clvol.scene.records import ConstVolume, IrradianceMeter, Shape
 
 
 def test_records_have_the_same_sizes_and_offsets_on_the_device(device):
@@ -24,7 +24,8 @@ def test_records_have_the_same_sizes_and_offsets_on_the_device(device):
     body = "if (i > 0) return;\n__global uint *p = out0;\n" + "\n".join(lines)
     out = np.zeros(len(expected), np.uint32)
     everything = replace(medium_of(1.0), emission_density=ConstVolume((1.0,)))  # with the rare records
-    Probe(device, scene_of(everything)).run([], body, [out])
+    meter = IrradianceMeter(Shape("rectangle", np.eye(4)))
+    Probe(device, scene_of(everything, sensor=meter)).run([], body, [out])
     assert out.tolist() == expected
 
 

@@ -47,6 +47,7 @@ MITSUBAS = {
         "shutter_open to_world"
     ),
     "orthographic": "far_clip focus_distance near_clip shutter_close shutter_open to_world",
+    "irradiancemeter": "shutter_close shutter_open",
     "batch": "shutter_close shutter_open",
     "hdrfilm": (
         "banner compensate component_format crop_height crop_offset_x crop_offset_y crop_width "

@@ -93,18 +93,21 @@ def scene_of(plugin):
         light = {"plugin": plugin}
     film = {"type": "hdrfilm", "rfilter": plugin} if kind == "rfilter" else {"type": "hdrfilm"}
     inside = {"film": plugin if kind == "film" else film} | ({"sampler": plugin} if kind == "sampler" else {})
-    sensor = plugin if kind == "sensor" else {"type": "perspective", "fov": 40.0, **inside}
+    sensors = {"sensor": plugin if kind == "sensor" else {"type": "perspective", "fov": 40.0, **inside}}
     texture = {"type": "diffuse", "reflectance": plugin} if kind == "texture" else {"type": "diffuse"}
     wall = PAINTED if plugin["type"] == "mesh_attribute" else {"type": "rectangle"}
     wall = wall | {"bsdf": plugin if kind == "bsdf" else texture}
     if plugin["type"] in AREA:
         wall["emitter"] = plugin
+    if plugin["type"] == "irradiancemeter":
+        wall |= sensors
+        sensors = {}
     medium = {"type": "heterogeneous"}
     if kind in ("volume", "phase"):
         medium[{"volume": "sigma_t"}.get(kind, kind)] = plugin
     fog = {"type": "cube", "bsdf": {"type": "null"}, "interior": plugin if kind == "medium" else medium}
     without_media = kind == "integrator" and not plugin["type"].startswith("vol")
-    return {"type": "scene", "sensor": sensor, "wall": wall} | light | ({} if without_media else {"fog": fog})
+    return {"type": "scene", "wall": wall} | sensors | light | ({} if without_media else {"fog": fog})
 
 
 def fingerprint(plugin):

@@ -154,6 +154,17 @@ def test_sensors_of_one_pixel_measure_the_same(folder, mitsuba, meter):
 
 
 @pytest.mark.mitsuba
+@pytest.mark.parametrize(("shape", "angle"), [("sphere", 0), ("disk", -60), ("cube", -60)])
+def test_irradiance_is_the_same(folder, mitsuba, shape, angle):
+    given = {"shape": shape, "angle": angle}
+    theirs, result = both(folder, mitsuba, "irradiance", given, 1 << 17, 1 << 20)
+    rounding = ROUNDING * theirs.mean()
+    t, freedom, error = welch(theirs[:, 0, 0], result.image[0, 0], result.variance[0, 0], rounding)
+    assert not deviating(t, freedom, FALSE_ALARM / 3)
+    assert (stats.t.isf(FALSE_ALARM / 18, freedom) * error < BIAS * theirs.mean()).all()
+
+
+@pytest.mark.mitsuba
 def test_a_picture_that_lacks_its_last_two_bounces_is_noticed(folder, mitsuba):
     theirs, result = both(folder, mitsuba, "passages", {"depth": 5}, 16, 512, {"depth": 3})
     found, _ = compare(theirs, result, sidak(FALSE_ALARM, len(PICTURES)))
