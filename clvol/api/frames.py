@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import inspect
 import threading
 import time
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, Self
 
 from clvol.api.order import Order
-from clvol.api.renders import render
+from clvol.api.renders import defaults
 from clvol.api.spreading import opened
 from clvol.base.arguments import positive
 from clvol.base.interrupts import interruptible
@@ -171,11 +170,7 @@ def progressive(scene: Scene, *, interval: float = 0.25, **options: Any) -> Fram
     UnknownOptionError
         A keyword that `render` does not know; a TypeError as well.
     """
-    known = {
-        name: parameter.default
-        for name, parameter in inspect.signature(render).parameters.items()
-        if name not in ("scene", *_WITHOUT)
-    }
+    known = {name: default for name, default in defaults().items() if name not in _WITHOUT}
     for name in options:
         if name not in known:
             raise UnknownOptionError(f"progressive takes interval and {', '.join(known)}, not {name!r}")

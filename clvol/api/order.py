@@ -14,7 +14,7 @@ from clvol.api.resuming import Before, check_same, checkpoint_of, resumable, wha
 from clvol.api.sharing import check_spread, is_spread
 from clvol.base.arguments import check_seed, flag
 from clvol.base.progress import Glance, Progress
-from clvol.cluster.dask import check_client
+from clvol.cluster.link import check_client
 from clvol.device.device import open_device
 from clvol.device.driver import driver_errors
 from clvol.errors import DeviceError, OptionError, RenderError

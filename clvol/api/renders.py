@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Any, overload
 
@@ -178,6 +179,12 @@ def render(  # type: ignore[misc]  # the options of several views are those of o
             result.stats["interrupted"] = interrupt.asked()
     result.profile = profiler.profile(result) if profiler else None
     return result
+
+
+def defaults() -> dict[str, Any]:
+    """The options of `render`, by name."""
+    given = inspect.signature(render).parameters
+    return {name: parameter.default for name, parameter in given.items() if name != "scene"}
 
 
 def _bar(progress: object) -> AbstractContextManager[ProgressCallback | None]:

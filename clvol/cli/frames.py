@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -15,11 +15,13 @@ from clvol.cli.messages import exit_by, mention
 from clvol.errors import DeviceError, Error
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     import numpy as np
     from rich.console import Console
 
+    from clvol.api.sequence import Pictures
+    from clvol.cli.painter import Painter
     from clvol.cli.pictures import Shown
     from clvol.cli.volumes import Asked
     from clvol.picture.result import Result
@@ -115,18 +117,37 @@ class Frames:
         return self.frames[0].outputs if self.frames else ()
 
 
+class Reel:
+    """Films of pictures that may come in another order: each is added once all before it were, or failed."""
+
+    def __init__(self, films: Sequence[Film]) -> None:
+        self._films = films
+        self._waiting: dict[int, np.ndarray | None] = {}
+        self._next = 0
+
+    def put(self, place: int, pixels: np.ndarray | None) -> None:
+        """The picture at a place, uint8 (height, width, 3); None where there is none."""
+        self._waiting[place] = pixels
+        while self._next in self._waiting:
+            following = self._waiting.pop(self._next)
+            self._next += 1
+            if following is not None:
+                for film in self._films:
+                    film.add(following)
+
+
 @dataclass
 class Series:
     """The work: renders each frame, and keeps count of what became of it.
 
     Parameters
     ----------
-    render : a scene and names of pictures to a result that is saved under them.
+    painter : renders and saves them.
     """
 
     asked: Asked
     frames: Frames
-    render: Callable[[Scene, Sequence[str]], Result]
+    painter: Painter
     shown: Shown
     size: tuple[int, int] | None
     overwrite: bool
@@ -135,38 +156,82 @@ class Series:
     fps: float
     _turned: Source | None = None  # the volume on the turntable is read once
     _told: bool = False  # what was chosen for all frames
+    _failures: dict[Frame, str] = field(default_factory=dict)
+    _skipped: int = 0
 
     def run(self) -> None:
         """Render all frames; exits with 1 where some failed, and as the signal says that ended it."""
         from clvol.picture.video import Film
 
-        failures: dict[Frame, str] = {}
-        skipped = 0
-        interrupted = False
         with ExitStack() as stack:
             films = [stack.enter_context(Film(name, self.fps)) for name in self.frames.films]
-            fixed = self._fixed()
-            for place, frame in enumerate(self.frames.frames):
-                if self._is_there(frame) and (not films or self._add_made(films, frame)):
-                    skipped += 1
-                    continue
-                try:
-                    result = self._one(frame, fixed, place)
-                    if result.stats["interrupted"]:
-                        interrupted = True
-                        break
-                    for film in films:
-                        film.add(self._pixels(result))
-                except DeviceError:
-                    raise
-                except (Error, OSError, MemoryError) as error:
-                    said = error.told(command=True) if isinstance(error, Error) else str(error)
-                    failures[frame] = said or "out of memory"
-                    mention([f"clvol: frame {frame.number} failed: {failures[frame]}"], err=True)
-        self._tell(failures, skipped, interrupted)
-        if failures and not interrupted:
+            fixed, reel = self._fixed(), Reel(films)
+            frames = self.frames.frames
+            pictures = self.painter.pictures(lambda place: self._scene(frames[place], fixed))
+            left = self._left(reel, films)
+            if pictures is not None and len(frames) > 1:
+                interrupted = self._spread(pictures, left, reel)
+            else:
+                interrupted = self._one_by_one(left, fixed, reel)
+        self._tell(interrupted)
+        if self._failures and not interrupted:
             sys.exit(FAILED)
         exit_by(interrupted)
+
+    def _left(self, reel: Reel, films: Sequence[Film]) -> Iterator[int]:
+        """Places of the frames that are to be rendered; of others films get the pictures that there are."""
+        for place, frame in enumerate(self.frames.frames):
+            made = self._made(frame) if films and self._is_there(frame) else None
+            if self._is_there(frame) and (not films or made is not None):
+                self._skipped += 1
+                reel.put(place, made)
+            else:
+                yield place
+
+    def _one_by_one(self, left: Iterator[int], fixed: Fixed | None, reel: Reel) -> bool:
+        """Render frames here; whether an end was asked for."""
+        for place in left:
+            frame, pixels = self.frames.frames[place], None
+            try:
+                result = self.painter.frame(self._scene(frame, fixed), frame.outputs)
+                if result.stats["interrupted"]:
+                    return True
+                self._mention(place, result)
+                pixels = self._pixels(result) if self.frames.films else None
+            except DeviceError:
+                raise
+            except (Error, OSError, MemoryError) as error:
+                self._fail(frame, error)
+            reel.put(place, pixels)
+        return False
+
+    def _spread(self, pictures: Pictures, left: Iterator[int], reel: Reel) -> bool:
+        """Have workers render whole frames; whether an end was asked for."""
+        from clvol.base.interrupts import interruptible
+        from clvol.base.progress import bar_of
+
+        with interruptible() as interrupt, bar_of(self.console) as bar:
+            interrupt.heed(patience=2)
+            task = bar.add_task("frames", total=len(self.frames.frames))
+            for place, found in pictures.results(left, interrupt.urgency):
+                frame, pixels = self.frames.frames[place], None
+                try:
+                    if isinstance(found, Exception):
+                        raise found
+                    self.painter.save(found, frame.outputs)
+                    self._mention(place, found)
+                    pixels = self._pixels(found) if self.frames.films else None
+                except (Error, OSError, MemoryError) as error:
+                    self._fail(frame, error)
+                reel.put(place, pixels)
+                bar.update(task, completed=place + 1)
+            return interrupt.asked()
+
+    def _fail(self, frame: Frame, error: Error | OSError | MemoryError) -> None:
+        """Note, and say, why there is no picture of a frame."""
+        said = error.told(command=True) if isinstance(error, Error) else str(error)
+        self._failures[frame] = said or "out of memory"
+        mention([f"clvol: frame {frame.number} failed: {self._failures[frame]}"], err=True)
 
     def _fixed(self) -> Fixed | None:
         """What all frames share; None for scenes, and of one volume what its first frame has."""
@@ -180,7 +245,8 @@ class Series:
             task = bar.add_task("looking at frames", total=None)
             return survey(self.frames.whole, self.asked.given, size_of(self.size), lambda: bar.advance(task))
 
-    def _one(self, frame: Frame, fixed: Fixed | None, place: int) -> Result:
+    def _scene(self, frame: Frame, fixed: Fixed | None) -> Scene:
+        """The scene of a frame, which fits its outputs; what was chosen for all is told once."""
         from clvol.staging.source import Source
 
         if frame.turn is None or self._turned is None:
@@ -190,15 +256,20 @@ class Series:
         if not self._told and not self.quiet:
             mention(lines)
         self._told = True
-        result = self.render(scene, frame.outputs)
-        if not self.quiet:
-            from clvol.base.progress import format_noise
+        self.painter.check(scene, frame.outputs)
+        return scene
 
-            names = ", ".join(frame.outputs) or f"frame {frame.number}"
-            noise, seconds = format_noise(result.noise), result.metadata["seconds"]
-            count = f"{place + 1} of {len(self.frames.frames)}"
-            mention([f"{names}: {result.samples[1]} spp, {seconds:.2f} s, noise {noise} ({count})"])
-        return result
+    def _mention(self, place: int, result: Result) -> None:
+        """Say that a frame is done."""
+        if self.quiet:
+            return
+        from clvol.base.progress import format_noise
+
+        frame = self.frames.frames[place]
+        names = ", ".join(frame.outputs) or f"frame {frame.number}"
+        noise, seconds = format_noise(result.noise), result.metadata["seconds"]
+        count = f"{place + 1} of {len(self.frames.frames)}"
+        mention([f"{names}: {result.samples[1]} spp, {seconds:.2f} s, noise {noise} ({count})"])
 
     def _pixels(self, result: Result) -> np.ndarray:
         """What a display shows, uint8 (height, width, 3)."""
@@ -212,8 +283,8 @@ class Series:
         """Whether it was rendered before, and is not to be again."""
         return not self.overwrite and bool(frame.outputs) and all(map(os.path.exists, frame.outputs))
 
-    def _add_made(self, films: Sequence[Film], frame: Frame) -> bool:
-        """Whether a frame's earlier picture could be added to the films."""
+    def _made(self, frame: Frame) -> np.ndarray | None:
+        """A frame's earlier picture as films take it, if it was saved as such."""
         import numpy as np
 
         from clvol.base.image_reading import UnreadableError, read_stored
@@ -224,17 +295,16 @@ class Series:
             except UnreadableError:
                 continue
             if stored.type_name == "uint8" and stored.pixels.shape[2] == 3:
-                for film in films:
-                    film.add(np.asarray(stored.pixels, np.uint8))
-                return True
-        return False
+                return np.asarray(stored.pixels, np.uint8)
+        return None
 
-    def _tell(self, failures: dict[Frame, str], skipped: int, interrupted: bool) -> None:
+    def _tell(self, interrupted: bool) -> None:
         """What became of them."""
+        failures = self._failures
         if interrupted:
-            mention(["clvol: interrupted; the frame under way is not saved"], err=True)
+            mention(["clvol: interrupted; frames under way are not saved"], err=True)
         if not self.quiet:
-            mention(self._summary(failures, skipped))
+            mention(self._summary())
         if failures:
             lines = [f"  frame {frame.number}, {frame.name}: {what}" for frame, what in failures.items()]
             mention(
@@ -242,9 +312,9 @@ class Series:
                 err=True,
             )
 
-    def _summary(self, failures: dict[Frame, str], skipped: int) -> Iterator[str]:
-        if skipped:
-            yield f"{skipped} frames were there already: --overwrite renders them again"
+    def _summary(self) -> Iterator[str]:
+        if self._skipped:
+            yield f"{self._skipped} frames were there already: --overwrite renders them again"
         for film in self.frames.films:
             if os.path.exists(film):
                 yield f"{film}: the film"

@@ -11,10 +11,11 @@ from clvol.cli.messages import exit_by, mention
 from clvol.errors import Error
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from rich.console import Console
 
+    from clvol.api.sequence import Pictures
     from clvol.base.output_files import StrPath
     from clvol.cli.pictures import Shown
     from clvol.cli.volumes import Asked
@@ -39,12 +40,9 @@ class Painter:
     def result(self, scene: Scene, outputs: Sequence[str]) -> Result:
         """Render a scene that fits the outputs."""
         import clvol
-        from clvol.base.output_files import check_spares
         from clvol.base.progress import RichProgress, Several
 
-        for output in outputs if self.trace is None else (*outputs, self.trace):
-            check_spares(output, scene.files)
-        _check_room(scene, outputs, self.options)
+        self.check(scene, outputs)
         piloted = self.options["technique"] == "auto:pilot"
         if piloted and not self.quiet and not self.console.is_terminal:
             from clvol.lab.repeat import announcement
@@ -65,16 +63,35 @@ class Painter:
             )
         return result
 
+    def check(self, scene: Scene, outputs: Sequence[str]) -> None:
+        """Refuse outputs that would replace what is rendered, or could not hold the picture."""
+        from clvol.base.output_files import check_spares
+
+        for output in outputs if self.trace is None else (*outputs, self.trace):
+            check_spares(output, scene.files)
+        _check_room(scene, outputs, self.options)
+
     def frame(self, scene: Scene, outputs: Sequence[str]) -> Result:
         """Render and save one of many; one that was ended early is not saved."""
-        from clvol.picture.saving import save_all
-
         result = self.result(scene, outputs)
         if not result.stats["interrupted"]:
-            self.shown = self.shown.fixed(result)  # or the film would flicker
-            for failure in save_all(self.shown.encoder(result), outputs).values():
-                raise failure
+            self.save(result, outputs)
         return result
+
+    def save(self, result: Result, outputs: Sequence[str]) -> None:
+        """Save one of many."""
+        from clvol.picture.saving import save_all
+
+        self.shown = self.shown.fixed(result)  # or the film would flicker
+        for failure in save_all(self.shown.encoder(result), outputs).values():
+            raise failure
+
+    def pictures(self, scene_of: Callable[[int], Scene]) -> Pictures | None:
+        """Many pictures on the workers of a cluster; None where there is no cluster."""
+        from clvol.api.sequence import Pictures
+
+        client = self.options["client"]
+        return None if client is None else Pictures(client, self.options, scene_of)
 
     def picture(self, outputs: Sequence[str], profiled: bool) -> NoReturn:
         """Render and save the only one, tell of it, and exit."""

@@ -217,9 +217,7 @@ def render(
         painter = Painter(asked, options, shown, trace, quiet, console, viewer)
         if frames is not None:
             check_series(options, shown, trace, frames)
-            series = Series(
-                asked, frames, painter.frame, shown, options["size"], overwrite, quiet, console, fps
-            )
+            series = Series(asked, frames, painter, shown, options["size"], overwrite, quiet, console, fps)
             series.run()
         painter.picture(outputs, profiled)
 

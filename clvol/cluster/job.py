@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from clvol.device.device import open_device
-from clvol.errors import RenderError, Told
+from clvol.errors import OptionError, RenderError, Told
 from clvol.picture.beside import beside
 from clvol.picture.parts import Part
 from clvol.planning.in_force import warnings
@@ -32,6 +32,10 @@ if TYPE_CHECKING:
 
 class Stopped(RenderError):  # noqa: N818
     """A range that was given up before any of its samples was done."""
+
+
+class UnfitError(OptionError):
+    """A worker that can render nothing of what it is asked for."""
 
 
 @dataclass(frozen=True, eq=False)

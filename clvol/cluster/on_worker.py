@@ -5,15 +5,15 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING
 
-from clvol.cluster.job import Renderer, Stopped
-from clvol.errors import Error, OptionError
+from clvol.cluster.job import Renderer, Stopped, UnfitError
+from clvol.errors import Error
 from clvol.version import __version__
 
 if TYPE_CHECKING:
     from clvol.cluster.job import About, Job
     from clvol.picture.parts import Part
 
-_turn = threading.Lock()
+turn = threading.Lock()
 """A worker renders one range at a time, with all of its device."""
 _ready: dict[str, Renderer] = {}
 """The renderer of the last job, by the job's name."""
@@ -30,19 +30,41 @@ def _here() -> str:
     return f"worker {get_worker().address}"
 
 
-def _renderer(job: Job) -> Renderer:
-    if job.version != __version__:
-        raise OptionError(
-            f"has clvol {__version__}, and {job.version} renders",
-            hint=f"install the same on all: pip install 'clvol[cluster]=={job.version}'",
+def check_version(version: str) -> None:
+    """UnfitError where another version of clvol is here than asks."""
+    if version != __version__:
+        raise UnfitError(
+            f"has clvol {__version__}, and {version} renders",
+            hint=f"install the same on all: pip install 'clvol[cluster]=={version}'",
         )
+
+
+def urgency_of(*names: str) -> int:
+    """How urgently an end was asked for, of a job or of a task."""
+    return max(_levels.get(name, 0) for name in names)
+
+
+def task_key() -> str:
+    """The key of the task that calls this."""
+    from distributed import get_worker
+
+    return str(get_worker().get_current_task())
+
+
+def forget_jobs() -> None:
+    """Free what earlier jobs have on the device; for whose turn it is."""
+    _ready.clear()
+
+
+def _renderer(job: Job) -> Renderer:
+    check_version(job.version)
     if job.name not in _ready:
-        _ready.clear()  # its memory is needed
+        forget_jobs()  # their memory is needed
         _ready[job.name] = Renderer(job)
     return _ready[job.name]
 
 
-def _told_from_here(error: Error) -> Error:
+def told_from_here(error: Error) -> Error:
     """The same error, which says where it was."""
     where = f"{_here()}: {error.where}" if error.where else _here()
     return type(error)(error.what, where, error.hint)
@@ -50,35 +72,38 @@ def _told_from_here(error: Error) -> Error:
 
 def about(job: Job) -> About:
     """What the worker makes of a job; it waits for no range of that job, whose time limit waits for it."""
-    while not _turn.acquire(timeout=_LOOKING_SECONDS):
+    while not turn.acquire(timeout=_LOOKING_SECONDS):
         if (ready := _ready.get(job.name)) is not None:
             return ready.about()
     try:
         return _renderer(job).about()
     except Error as error:
-        raise _told_from_here(error) from None
+        raise told_from_here(error) from None
     finally:
-        _turn.release()
+        turn.release()
 
 
 def part_of_range(job: Job, first: int, count: int, seed: int) -> Part:
     """The sums of a range, once it is this task's turn."""
-    from distributed import get_worker
-
-    key = str(get_worker().get_current_task())
+    key = task_key()
 
     def urgency() -> int:
-        return max(_levels.get(job.name, 0), _levels.get(key, 0))
+        return urgency_of(job.name, key)
 
-    with _turn:
+    with turn:
         try:
             if urgency() > 1:
                 raise Stopped("was to end before it began")
             return _renderer(job).part(first, count, seed, urgency)
         except Error as error:
-            raise _told_from_here(error) from None
+            raise told_from_here(error) from None
         finally:
-            _levels.pop(key, None)
+            forget_task(key)
+
+
+def forget_task(key: str) -> None:
+    """A task is done: an end that was asked of it counts no longer."""
+    _levels.pop(key, None)
 
 
 def samples(part: Part) -> int:
@@ -96,7 +121,7 @@ def forget(name: str) -> None:
     _levels[name] = 3
 
     def free() -> None:
-        with _turn:
+        with turn:
             _ready.pop(name, None)
 
     threading.Thread(target=free, daemon=True).start()

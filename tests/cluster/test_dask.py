@@ -108,7 +108,7 @@ def test_a_job_is_told_of_while_one_of_its_ranges_renders(monkeypatch):
     ranges = job.Job(scene(), None, 0, {})
     ready = SimpleNamespace(about=lambda: "ready")
     monkeypatch.setattr(on_worker, "_ready", {ranges.name: ready})
-    with on_worker._turn:
+    with on_worker.turn:
         assert on_worker.about(ranges) == "ready"
 
 
@@ -118,10 +118,10 @@ def test_a_straggler_is_helped_and_counted_once(client, expected, monkeypatch):
     def late(renderer, first, count, seed, urgency):
         if first == 20 and not slow:
             slow.append(first)
-            on_worker._turn.release()  # the workers of this test share a process, and take turns in it
+            on_worker.turn.release()  # the workers of this test share a process, and take turns in it
             while not urgency():
                 time.sleep(0.01)
-            on_worker._turn.acquire()
+            on_worker.turn.acquire()
         return part(renderer, first, count, seed, urgency)
 
     monkeypatch.setattr(job.Renderer, "part", late)

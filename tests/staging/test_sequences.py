@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import shutil
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,7 @@ from click.testing import CliRunner, Result
 
 import clvol
 from clvol.base.frames import Pattern, parse_frames
+from clvol.cli.frames import Reel
 from clvol.cli.main import main
 from clvol.errors import OptionError, VolumeError
 from clvol.picture.video import Film
@@ -280,6 +282,14 @@ def test_mistakes_are_one_line(folder: Path, arguments: list[str], fragment: str
     assert len(outcome.stderr.splitlines()) == 1, outcome.stderr
     assert fragment in outcome.stderr
     assert not pictures(folder)
+
+
+def test_films_get_frames_in_order_whatever_order_they_come_in() -> None:
+    film: list[int] = []
+    reel = Reel([SimpleNamespace(add=lambda pixels: film.append(int(pixels[0])))])  # type: ignore[list-item]
+    for place in (1, 3, 0, 4, 2):
+        reel.put(place, None if place == 3 else np.array([place]))
+    assert film == [0, 1, 2, 4]
 
 
 # --- films -----------------------------------------------------------------------------------------
