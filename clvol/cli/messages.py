@@ -23,6 +23,13 @@ if TYPE_CHECKING:
 USER_ERROR = 2
 LONGEST_LINE = 3000
 """Characters of an error's line at most, whatever was on the command line."""
+_PLAIN = {
+    "integer range": "whole number",
+    "integer": "whole number",
+    "float range": "number",
+    "float": "number",
+}
+"""What click's types are in words; the longer names first."""
 
 
 class OneLineErrors(click.Group):
@@ -111,6 +118,8 @@ def exit_by(ended_early: bool) -> NoReturn:
 
 def _usage_message(error: click.UsageError) -> str:
     message = error.format_message().rstrip(".")
+    for of_click, plain in _PLAIN.items():
+        message = message.replace(f"' is not a valid {of_click}", f"' is not a {plain}")
     command = error.ctx.command_path if error.ctx else "clvol"
     return f"{message[:1].lower()}{message[1:]}; see {command} --help"
 

@@ -91,6 +91,18 @@ def test_grids_are_chosen_by_what_the_user_has(tmp_path: Path) -> None:
         clvol.load_volume(tmp_path / "a.npz")
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["render", "a.xml", "-o", "a.exr", "--spp", "1e3"], "'--spp': '1e3' is not a whole number"),
+        (["render", "a.xml", "-o", "a.exr", "--step", "x"], "'--step': 'x' is not a number"),
+        (["ray", "a.xml", "x", "1"], "'X': 'x' is not a whole number"),
+    ],
+)
+def test_numbers_are_told_without_the_names_of_types(words: list[str], message: str) -> None:
+    assert message in CliRunner().invoke(main, words).output
+
+
 def test_a_volume_is_no_scene_in_either_language(nan: Path) -> None:
     assert "`clvol render`" in said(
         "compare", nan, "--techniques", "delta,regular", "-o", nan.with_name("report")
