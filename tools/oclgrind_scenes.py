@@ -121,7 +121,7 @@ def box(medium: dict[str, Any], **more: Any) -> dict[str, Any]:
 
 DIFFUSE = {"type": "diffuse", "reflectance": TEXTURE}
 MATERIALS = [
-    {"type": "conductor", "material": "Au"},
+    {"type": "conductor", "eta": TEXTURE, "k": 2.0},
     {"type": "thindielectric"},
     {"type": "principled", "base_color": TEXTURE, "roughness": 0.4, "clearcoat": 0.5, "metallic": 0.3},
     {"type": "principled", "base_color": 0.5, "roughness": 0.3, "spec_trans": 0.8, "eta": 1.4},

@@ -9,7 +9,7 @@ INLINE bool conductor_sample(const Scene *scene, __global const Material *materi
                              BsdfSample *sample)
 {
     const Spectrum weight = specular_reflectance(scene, material, uv, channel) *
-                            conductor_reflectance(material, wi.z, channel);
+                            conductor_reflectance(METAL_AT(scene, material, uv), wi.z, channel);
     return delta_sample(sample, mirrored(wi), weight, 1.0f) && wi.z > 0.0f;
 }
 

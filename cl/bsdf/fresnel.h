@@ -2,6 +2,9 @@
 #ifndef CLVOL_BSDF_FRESNEL_H
 #define CLVOL_BSDF_FRESNEL_H
 #include "core/scene.h"
+#if CLVOL_HAS_METAL_TEXTURES
+#include "texture/texture.h"
+#endif
 
 typedef struct {
     float reflectance;
@@ -49,10 +52,29 @@ INLINE float fresnel_conductor(float cos_i, float eta, float k)
     return 0.5f * (s + p);
 }
 
+/* A metal's indices may be textures: METAL_AT names it, and where on it if so. */
+#if CLVOL_HAS_METAL_TEXTURES
+#define METAL_AT(scene, material, uv) scene, material, uv
+
+/* One of the indices; negative: that of texture -1 - index. */
+INLINE Spectrum metal_index(const Scene *scene, __global const float *index, float2 uv, int channel)
+{
+    return material_color(scene, index, index[0] < 0.0f ? (int)(-1.0f - index[0]) : -1, uv, channel);
+}
+
+INLINE Spectrum conductor_reflectance(const Scene *scene, __global const Material *material, float2 uv, float cos_i,
+                                      int channel)
+{
+    const Spectrum eta = metal_index(scene, material->eta, uv, channel);
+    const Spectrum k = metal_index(scene, material->k, uv, channel);
+#else
+#define METAL_AT(scene, material, uv) material
+
 INLINE Spectrum conductor_reflectance(__global const Material *material, float cos_i, int channel)
 {
     const Spectrum eta = to_spectrum(load_vector(material->eta), channel);
     const Spectrum k = to_spectrum(load_vector(material->k), channel);
+#endif
 #if CLVOL_SPECTRUM == 3
     return (float3)(fresnel_conductor(cos_i, eta.x, k.x), fresnel_conductor(cos_i, eta.y, k.y),
                     fresnel_conductor(cos_i, eta.z, k.z));

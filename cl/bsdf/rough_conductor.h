@@ -20,7 +20,7 @@ INLINE bool rough_conductor_sample(const Scene *scene, __global const Material *
     const float visibility = visibility_over_cos(FACETS_OF(material), wi);
     const float ratio = shadowing(FACETS_OF(material), wo) * shadowing_over_cos(FACETS_OF(material), wi) / visibility;
     const Spectrum weight = ratio * specular_reflectance(scene, material, uv, channel) *
-                            conductor_reflectance(material, cos_m, channel);
+                            conductor_reflectance(METAL_AT(scene, material, uv), cos_m, channel);
     return scattered_sample(sample, wo, weight, 0.25f * visibility * microfacet_density(FACETS_OF(material), m), 1.0f);
 }
 
@@ -36,7 +36,7 @@ INLINE Spectrum rough_conductor_value(const Scene *scene, __global const Materia
     *pdf = density * visibility_over_cos(FACETS_OF(material), wi);
     const float value = density * shadowing_over_cos(FACETS_OF(material), wi) * shadowing(FACETS_OF(material), wo);
     return value * specular_reflectance(scene, material, uv, channel) *
-           conductor_reflectance(material, dot_of(wi, m), channel);
+           conductor_reflectance(METAL_AT(scene, material, uv), dot_of(wi, m), channel);
 }
 
 #endif

@@ -145,7 +145,7 @@ MATERIAL = _record(
     ("transmittance", "f", 3),  # specular_transmittance
     ("transmittance_texture", "i", 1),
     ("ior", "f", 1),  # int_ior / ext_ior
-    ("eta", "f", 3),  # of a conductor
+    ("eta", "f", 3),  # of a conductor; as k: -1 - the number of a texture
     ("k", "f", 3),
     ("distribution", "i", 1),  # DISTRIBUTION_BECKMANN, DISTRIBUTION_GGX
     ("alpha_u", "f", 1),

@@ -81,6 +81,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_HAS_VOLUME_TEXTURES": int(f.volume_textures),
         "CLVOL_HAS_MATERIAL_TABLES": int(f.material_tables),
         "CLVOL_HAS_ROUGHNESS_TEXTURES": int(f.rough_textures),
+        "CLVOL_HAS_METAL_TEXTURES": int(f.metal_textures),
         "CLVOL_VARIED_ROUGHNESS": int(f.rough_textures or any("PRINCIPLED" in name for name in f.bsdfs)),
         "CLVOL_HAS_BUMPS": int(f.bumps),
         "CLVOL_HAS_REFLECTION": int(f.reflecting),

@@ -77,6 +77,7 @@ class Features:
     volume_textures: bool = False
     material_tables: bool = False
     rough_textures: bool = False
+    metal_textures: bool = False
     bumps: bool = False
     reflecting: bool = False
     samples_at_surfaces: bool = False

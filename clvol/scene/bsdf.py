@@ -21,7 +21,6 @@ from clvol.scene.materials import (
     RoughDielectric,
     Roughness,
     RoughPlastic,
-    Spectrum,
     Texture,
     TwoSided,
 )
@@ -227,7 +226,7 @@ def _indices(reader: Reader, interior: str, differ: bool = False) -> tuple[float
     return inside, outside
 
 
-def _metal(reader: Reader) -> tuple[Spectrum, Spectrum]:
+def _metal(reader: Reader) -> tuple[Texture, Texture]:
     """The indices eta and k; of a perfect mirror where nothing is given."""
     name = reader.string("material", "none")
     given = [key for key in ("eta", "k") if reader.has(key)]
@@ -238,10 +237,7 @@ def _metal(reader: Reader) -> tuple[Spectrum, Spectrum]:
             hint = join_hints(did_you_mean(name, METALS), f"supported: none, {listed(METALS)}")
             reader.fail(f"unknown metal '{name}'", "material", hint)
         return METALS[name]
-    for key in given:
-        if not reader.is_value(key):
-            reader.refuse_plugin(key, "a number, an rgb or a spectrum (no texture here)")
-    return reader.color("eta", 0.0), reader.color("k", 1.0)
+    return texture(reader, "eta", 0.0, maximum=math.inf), texture(reader, "k", 1.0, maximum=math.inf)
 
 
 def _microfacets(reader: Reader) -> tuple[str, Roughness, Roughness]:

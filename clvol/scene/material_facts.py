@@ -36,6 +36,12 @@ def _colors(side: Side) -> list[Texture]:
     return [getattr(side.bsdf, name) for name in _COLORS if hasattr(side.bsdf, name)]
 
 
+def _indices(side: Side) -> list[Texture]:
+    """Of a metal, eta and k."""
+    bsdf = side.bsdf
+    return [bsdf.eta, bsdf.k] if isinstance(bsdf, Conductor | RoughConductor) else []
+
+
 def _numbers(side: Side) -> list[Texture | float]:
     """What may be textures beside colours."""
     return [getattr(side.bsdf, name) for name in _NUMBERS if hasattr(side.bsdf, name)]
@@ -79,11 +85,7 @@ def bsdf_kinds(bsdf: Bsdf) -> set[str]:
 
 def is_grey(bsdf: Bsdf) -> bool:
     """Whether it treats all channels alike; opacities always do."""
-    colors = [color for side in bsdf_parts(bsdf) for color in _colors(side)]
-    metals = [s.bsdf for s in bsdf_parts(bsdf) if isinstance(s.bsdf, Conductor | RoughConductor)]
-    return all(color_is_grey(color) for color in colors) and all(
-        len(set(value)) == 1 for metal in metals for value in (metal.eta, metal.k)
-    )
+    return all(color_is_grey(c) for side in bsdf_parts(bsdf) for c in (*_colors(side), *_indices(side)))
 
 
 def passes_light(bsdf: Bsdf) -> bool:
@@ -110,7 +112,8 @@ def samples_lights(bsdf: Bsdf) -> bool:
 
 def bsdf_textures(bsdf: Bsdf) -> list[Varied]:
     """Its textures, opacities included, in no particular order."""
-    found = [t for side in bsdf_parts(bsdf) for t in (*_colors(side), *_numbers(side), *side.opacities)]
+    sides = bsdf_parts(bsdf)
+    found = [t for s in sides for t in (*_colors(s), *_indices(s), *_numbers(s), *s.opacities)]
     found += bsdf_weights(bsdf) + [_bend_map(bend) for bend in bsdf_bends(bsdf)]
     return [t for t in found if isinstance(t, Varied)]
 
@@ -134,6 +137,11 @@ def has_rough_textures(bsdf: Bsdf) -> bool:
     """Whether a microfacet model's roughness has a texture (that of principled ones is in a table)."""
     sides = [s.bsdf for s in bsdf_parts(bsdf) if isinstance(s.bsdf, RoughDielectric | RoughConductor)]
     return any(isinstance(a, Varied) for s in sides for a in (s.alpha_u, s.alpha_v))
+
+
+def has_metal_textures(bsdf: Bsdf) -> bool:
+    """Whether a metal's eta or k has a texture."""
+    return any(isinstance(t, Varied) for side in bsdf_parts(bsdf) for t in _indices(side))
 
 
 def has_textures(bsdf: Bsdf) -> bool:

@@ -111,10 +111,10 @@ class RoughDielectric:
 
 @dataclass(frozen=True, eq=False)
 class Conductor:
-    """Smooth metal of complex index eta - i k, each a Spectrum; eta 0 with k 1 reflects everything."""
+    """Smooth metal of complex index eta - i k; eta 0 with k 1 reflects everything."""
 
-    eta: Spectrum = (0.0,)
-    k: Spectrum = (1.0,)
+    eta: Texture = (0.0,)
+    k: Texture = (1.0,)
     specular_reflectance: Texture = (1.0,)
 
 
@@ -122,8 +122,8 @@ class Conductor:
 class RoughConductor:
     """Metal of microfacets."""
 
-    eta: Spectrum = (0.0,)
-    k: Spectrum = (1.0,)
+    eta: Texture = (0.0,)
+    k: Texture = (1.0,)
     distribution: str = "beckmann"
     alpha_u: Roughness = 0.1
     alpha_v: Roughness = 0.1

@@ -263,8 +263,8 @@ _NESTED = {
 }
 
 
-def _bsdf(bsdf: Any, seen: set[int]) -> Found:
-    """Colours, textures, roughness and indices of a BSDF and of those inside it."""
+def _bsdf(bsdf: Any, seen: set[int], most: float = 1.0) -> Found:
+    """Colours up to `most`, textures, roughness and indices of a BSDF and of those inside it."""
     if id(bsdf) in seen:
         return
     seen.add(id(bsdf))
@@ -281,15 +281,16 @@ def _bsdf(bsdf: Any, seen: set[int]) -> Found:
         elif name in ("eta", "k") and isinstance(value, tuple):
             yield f"{name}.value", _colour(bsdf, name, np.inf)
         elif name in _COLOURS and isinstance(value, tuple):
-            yield f"{name}.value", _colour(bsdf, name, 2.0 if name == "diff_trans" else 1.0)
+            yield f"{name}.value", _colour(bsdf, name, 2.0 if name == "diff_trans" else most)
         elif isinstance(value, materials.Checkerboard):
-            yield from _nested(name, _bsdf(value, seen))
+            yield from _nested(name, _bsdf(value, seen, np.inf if name in ("eta", "k") else 1.0))
         elif isinstance(value, materials.VolumeTexture) and id(value.volume) not in seen:
             seen.add(id(value.volume))
             yield from _nested(f"{name}.volume", _volume(value.volume, 1.0, signed=False))
         elif isinstance(value, materials.Bitmap) and id(value) not in seen:
             seen.add(id(value))
-            yield f"{_NESTED.get(name, name)}.data", _field(value, "pixels", values.texels, values.frozen)
+            check = values.bright_texels if name in ("eta", "k") else values.texels
+            yield f"{_NESTED.get(name, name)}.data", _field(value, "pixels", check, values.frozen)
 
 
 def _emitter(emitter: records.Emitter, _seen: set[int]) -> Found:

@@ -275,7 +275,7 @@ def texels(value: Any, name: str, maximum: float = 1.0) -> np.ndarray:
 
 
 def bright_texels(value: Any, name: str) -> np.ndarray:
-    """The texels of a light's bitmap."""
+    """The texels of a light's bitmap, or of a metal's."""
     return texels(value, name, BRIGHTEST)
 
 

@@ -116,7 +116,8 @@ def _record(side: Side, textures: TextureTable, tables: list[np.ndarray]) -> np.
     if isinstance(bsdf, materials.Principled | materials.PrincipledThin):
         _set_principled(record, side, textures, tables)
     if isinstance(bsdf, materials.Conductor | materials.RoughConductor):
-        record["eta"], record["k"] = (rgb(value) for value in (bsdf.eta, bsdf.k))
+        for name, index in (("eta", bsdf.eta), ("k", bsdf.k)):
+            record[name] = -1 - textures.add(index) if isinstance(index, Varied) else rgb(index)
     if isinstance(bsdf, materials.RoughDielectric | materials.RoughConductor | materials.RoughPlastic):
         record["distribution"] = layout.enum("DISTRIBUTION", bsdf.distribution)
         for field in ("alpha_u", "alpha_v"):

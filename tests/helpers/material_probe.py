@@ -91,6 +91,7 @@ def source(kinds, channel=None, textures=True):
     """OpenCL text with these kinds of BSDF, maybe textures; with a `channel`, spectra are that one."""
     defines = {f"CLVOL_BSDF_{kind}": int(kind in kinds) for kind in layout.BSDFS}
     defines |= {"CLVOL_HAS_ROUGHNESS_TEXTURES": +textures, "CLVOL_VARIED_ROUGHNESS": 1}
+    defines |= {"CLVOL_HAS_METAL_TEXTURES": +textures}
     defines |= {"CLVOL_HAS_TEXTURES": +textures, "CLVOL_HAS_BITMAPS": +textures, "CLVOL_EXTINCTION": 1}
     defines |= {"CLVOL_SPECTRUM": 3 if channel is None else 1, "CLVOL_ONE_CHANNEL_PER_PATH": 1}
     buffers = ("const Material *materials", "const Texture *textures", "const float *texels")

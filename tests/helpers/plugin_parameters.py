@@ -423,10 +423,10 @@ INSTEAD = {
     ("distant", "target"): ({"film": PIXEL}, {"type": "rectangle"}),
     ("hdrfilm", "crop_offset_x"): ({"crop_width": 4}, 1),
     ("hdrfilm", "crop_offset_y"): ({"crop_height": 4}, 1),
-    ("conductor", "eta"): ({}, RGB),
+    ("conductor", "eta"): ({}, TEXTURE),
     ("conductor", "k"): ({}, RGB),
     ("roughconductor", "eta"): ({}, RGB),
-    ("roughconductor", "k"): ({}, RGB),
+    ("roughconductor", "k"): ({}, TEXTURE),
     **{
         (bsdf, f"alpha_{axis}"): ({"alpha_u": 0.1, "alpha_v": 0.1}, 0.3)
         for bsdf in ("roughdielectric", "roughconductor")

@@ -7,7 +7,7 @@ that has everything.
 import numpy as np
 import pytest
 from material_probe import MaterialProbe, read
-from mitsuba_bsdfs import BSDFS, DELTAS, INCIDENT, PAIRS, RED, VALUES
+from mitsuba_bsdfs import BSDFS, DELTAS, INCIDENT, PAIRS, RED, TINT, VALUES
 from scipy import special
 from stat_tests import FALSE_ALARM, chi2_p_value
 
@@ -279,6 +279,48 @@ def test_roughness_from_a_texture(probe, device):
         assert np.allclose(one[0], other[0], rtol=1e-5) and np.allclose(one[1], other[1], rtol=1e-5)
         elsewhere, _ = both.value(both.sides[0, 0], PAIRS[:, 0], PAIRS[:, 1], uv=(0.25, 0.25))
         assert not np.allclose(elsewhere, one[0], rtol=1e-2)
+
+
+INDICES = np.array([[[0.2, 1.1, 2.0], [3.0, 2.0, 0.5]]], np.float32)
+INDEX_MAP = {"type": "bitmap", "bitmap": INDICES, "filter_type": "nearest", "raw": True}
+METAL_MAP = {
+    "eta": INDEX_MAP,
+    "k": {"type": "checkerboard", "color0": 2.0, "color1": {"type": "rgb", "value": [0.1, 0.2, 0.3]}},
+}
+
+
+MITSUBAS_METAL = {
+    (0.2, 0.2): (0.426573, 0.239689, 0.192963),
+    (0.7, 0.2): (0.126205, 0.0598368, 0.12953),
+    (0.2, 0.7): (0.42128, 0.00685087, 0.0622978),
+}
+"""By (u, v) what ``sample`` of Mitsuba 3.9.1 gave for half the light at (0.6, 0, 0.8)."""
+
+
+@pytest.mark.parametrize("kind", ["conductor", "roughconductor"])
+def test_indices_of_metals_from_textures(device, kind):
+    """At every place all is as with the indices there."""
+    rest = {"type": kind, "specular_reflectance": TINT} | ({"alpha": 0.3} if kind == "roughconductor" else {})
+    for uv, eta, k in (
+        ((0.2, 0.2), INDICES[0, 0], (2.0, 2.0, 2.0)),
+        ((0.7, 0.2), INDICES[0, 1], (0.1, 0.2, 0.3)),
+        ((0.2, 0.7), INDICES[0, 0], (0.1, 0.2, 0.3)),
+    ):
+        plain = {"eta": {"type": "rgb", "value": eta.tolist()}, "k": {"type": "rgb", "value": list(k)}}
+        both = MaterialProbe(device, [read(rest | METAL_MAP), read(rest | plain)])
+        numbers = [(0.1 + 0.2 * n, 0.5, 0.3) for n in range(4)]
+        one, other = (both.sample(n, unit(0.5, 0.2, 0.6), numbers, uv=uv) for n in both.sides[:, 0])
+        assert one.found.all() and np.allclose(one.weight, other.weight, rtol=1e-5)
+        if kind == "roughconductor":
+            one, other = (both.value(n, PAIRS[:, 0], PAIRS[:, 1], uv=uv)[0] for n in both.sides[:, 0])
+            assert np.allclose(one, other, rtol=1e-5) and one.max() > 0
+
+
+def test_a_textured_mirror_reflects_as_mitsubas(device):
+    both = MaterialProbe(device, [read({"type": "conductor", "specular_reflectance": 0.5} | METAL_MAP)])
+    for uv, expected in MITSUBAS_METAL.items():
+        found = both.sample(both.sides[0, 0], np.array([0.6, 0.0, 0.8]), [(0.5, 0.3, 0.4)], uv=uv)
+        assert np.allclose(found.weight[0], expected, rtol=1e-5)
 
 
 def test_the_back_of_a_masked_principled_is_black(device):

@@ -71,6 +71,10 @@ def test_principled():
     assert glass.eta == 1.001 and facts.bsdf_kinds(glass) == {"PRINCIPLED_GLASS"}
     assert read({"type": "principled", "specular": 0, "spec_trans": 1.0}).eta > 1
     assert facts.has_textures(read({"type": "roughconductor", "alpha": CHECKERS}))
+    metal = read({"type": "conductor", "eta": CHECKERS})
+    assert facts.has_textures(metal) and facts.has_metal_textures(metal)
+    assert facts.is_grey(metal) == facts.color_is_grey(metal.eta)
+    assert not facts.has_metal_textures(read({"type": "conductor", "specular_reflectance": CHECKERS}))
     with pytest.raises(SceneError, match="light passes"):
         read({"type": "twosided", "inner": {"type": "principled", "spec_trans": 0.5}})
 
@@ -142,7 +146,7 @@ def test_names_of_indices_and_metals():
         ({"type": "roughconductor", "distribution": "phong"}, "cannot be 'phong'"),
         ({"type": "conductor", "material": "au"}, "unknown metal 'au'"),
         ({"type": "conductor", "material": "Au", "k": 1.0}, "either a material or eta and k"),
-        ({"type": "conductor", "eta": CHECKERS}, "no texture here"),
+        ({"type": "conductor", "eta": DIFFUSE}, "a spectrum or a texture, got a 'diffuse'"),
         ({"type": "plastic", "nonlinear": 1}, "true or false"),
         ({"type": "twosided"}, "no BSDF in it"),
         ({"type": "twosided", "a": DIFFUSE, "b": DIFFUSE, "c": DIFFUSE}, "at most 2 BSDFs, got 3"),

@@ -274,3 +274,17 @@ def test_the_table_shows_every_value_in_a_line(scene):
     lines = repr(clvol.traverse(scene)).splitlines()
     assert any(line.split() == ["sensor.film.size", "(8,", "6)"] for line in lines)
     assert any("sigma_t.data" in line and "(4, 5, 6)" in line for line in lines)
+
+
+def test_indices_of_metals_that_are_textures_have_no_bound():
+    checkers = {"type": "checkerboard", "color0": 3.0}
+    metal = {"type": "conductor", "eta": {"type": "bitmap", "bitmap": PICTURE}, "k": checkers}
+    scene = clvol.load_dict(
+        {"type": "scene", "sensor": {"type": "perspective"}, "m": {"type": "sphere", "bsdf": metal}}
+    )
+    parameters = clvol.traverse(scene)
+    parameters.update({"m.bsdf.eta.data": 4 * PICTURE, "m.bsdf.k.color1": 5.0})
+    [shape] = scene.shapes
+    assert shape.bsdf.eta.pixels.max() == 4 and shape.bsdf.k.color1 == (5.0,)
+    with pytest.raises(clvol.SceneError, match="texels must be in"):
+        parameters["m.bsdf.eta.data"] = -PICTURE
