@@ -208,6 +208,40 @@ def test_a_mix_is_a_blend_of_its_two_materials(load):
     assert isinstance(alone.shapes[0].bsdf, Dielectric)
 
 
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ("", lambda texels: texels),
+        ('"float scale" .5', lambda texels: texels / 2),
+        ('"bool invert" true', lambda texels: 1 - texels),
+        ('"bool invert" true "float scale" .5', lambda texels: 1 - texels / 2),
+        ('"bool invert" true "float scale" 3', lambda texels: np.clip(1 - 3 * texels, 0, 1)),
+    ],
+)
+def test_a_picture_is_scaled_before_it_is_inverted(load, tmp_path, given, expected):
+    """As `Evaluate` of pbrt's image textures has it; the last row of the file is at v = 0."""
+    texels = np.array([[0.1, 0.2], [0.4, 0.8]], np.float32)
+    pixels = np.repeat(texels[..., None], 3, axis=2)
+    (tmp_path / "a.pfm").write_bytes(b"PF\n2 2\n-1\n" + pixels[::-1].tobytes())  # from the bottom up
+    picture = (
+        f'Texture "a" "spectrum" "imagemap" "string filename" "a.pfm" "string encoding" "linear" {given}'
+    )
+    scene = load(f'{picture} Material "diffuse" "texture reflectance" "a" Shape "sphere"')
+    found = scene.shapes[0].bsdf.front.reflectance
+    assert found.pixels[..., 1] == pytest.approx(expected(texels))
+    assert (found.to_uv @ [0.25, 0.25, 1])[:2] == pytest.approx([0.25, 0.75])
+
+
+def test_a_scaled_texture_is_a_product(load, tmp_path):
+    (tmp_path / "a.pfm").write_bytes(b"PF\n1 1\n-1\n" + np.full(3, 0.5, np.float32).tobytes())
+    picture = (
+        'Texture "a" "spectrum" "imagemap" "string filename" "a.pfm" "bool invert" true "float scale" .4'
+    )
+    product = 'Texture "b" "spectrum" "scale" "texture tex" "a" "float scale" .5'
+    scene = load(f'{picture} {product} Material "diffuse" "texture reflectance" "b" Shape "sphere"')
+    assert scene.shapes[0].bsdf.front.reflectance.pixels == pytest.approx(0.5 * (1 - 0.4 * 0.5))
+
+
 def test_what_cannot_be_rendered_is_told_at_once(load):
     with pytest.raises(clvol.SceneError) as caught:
         load('Shape "curve"\nShape "sphere" "float phimax" 90\nLightSource "projection"')

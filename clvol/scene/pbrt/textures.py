@@ -22,7 +22,7 @@ _WRAPS = {"repeat": "repeat", "clamp": "clamp", "black": "clamp", "octahedralsph
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A picture over (u, v): texels times `factor`, or 1 less them first."""
+    """A picture over (u, v): `factor` times texels, where these are `scale` times its own, or 1 less that."""
 
     path: str
     to_uv: np.ndarray
@@ -31,6 +31,7 @@ class Picture:
     raw: bool
     where: str
     inverted: bool = False
+    scale: float = 1.0
     factor: tuple[float, ...] = (1.0, 1.0, 1.0)
 
 
@@ -99,14 +100,14 @@ class Textures:
             to_uv = np.diag([0.5, 0.5, 1]) @ texture.to_uv
             return make("texture", "checkerboard", texture.where, color0=first, color1=second, to_uv=to_uv)
         common = {"to_uv": texture.to_uv, "filter_type": texture.filter_type, "wrap_mode": texture.wrap_mode}
-        if texture.factor == (1.0, 1.0, 1.0) and not texture.inverted:
+        if (texture.scale, *texture.factor) == (1.0, 1.0, 1.0, 1.0) and not texture.inverted:
             return make("texture", "bitmap", texture.where, filename=texture.path, raw=texture.raw, **common)
         pixels = self._pixels(texture)
         return make("texture", "bitmap", texture.where, bitmap=pixels, raw=True, **common)
 
     def _pixels(self, picture: Picture) -> np.ndarray:
-        pixels = read_image(picture.path, picture.where, picture.raw)
-        pixels = 1 - pixels if picture.inverted else pixels
+        pixels = picture.scale * read_image(picture.path, picture.where, picture.raw)
+        pixels = np.maximum(1 - pixels, 0) if picture.inverted else pixels
         clipped: np.ndarray = np.clip(pixels * np.asarray(picture.factor, np.float32), 0, 1)
         return clipped
 
@@ -196,7 +197,7 @@ class Textures:
             encoding == "linear",
             thing.where,
             parameters.boolean("invert", False),
-            (parameters.number("scale", 1.0, 0.0),) * 3,
+            parameters.number("scale", 1.0, 0.0),
         )
 
 
