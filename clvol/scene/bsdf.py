@@ -24,10 +24,10 @@ from clvol.scene.materials import (
     Texture,
     TwoSided,
 )
-from clvol.scene.refraction import INDICES, METALS
+from clvol.scene.refraction import COMMON_NAMES, INDICES, METALS
 from clvol.scene.sides import MAX_PARTS, count_parts
 from clvol.scene.texture import constant, roughness, share, texture
-from clvol.scene.vocabulary import did_you_mean, join_hints, listed
+from clvol.scene.vocabulary import close_ones, join_hints, listed
 
 if TYPE_CHECKING:
     from clvol.scene.reader import Reader
@@ -207,9 +207,7 @@ def _index(reader: Reader, name: str, default: str) -> float:
         return reader.number(name, 1.0, minimum=0.0, open_interval=True)
     given = reader.string(name, default)
     if given.lower() not in INDICES:
-        hint = join_hints(
-            did_you_mean(given.lower(), INDICES), f"give a number, or one of: {listed(INDICES)}"
-        )
+        hint = join_hints(close_ones(given, INDICES), f"give a number, or one of: {listed(INDICES)}")
         reader.fail(f"'{name}' of bsdf '{reader.type}' is an unknown material '{given}'", name, hint)
     return INDICES[given.lower()]
 
@@ -234,7 +232,9 @@ def _metal(reader: Reader) -> tuple[Texture, Texture]:
         reader.fail("give either a material or eta and k, not both", given[0])
     if name != "none":
         if name not in METALS:
-            hint = join_hints(did_you_mean(name, METALS), f"supported: none, {listed(METALS)}")
+            common = COMMON_NAMES.get(name.lower())
+            close = f"did you mean '{common}'?" if common else close_ones(name, METALS)
+            hint = join_hints(close, f"supported: none, {listed(METALS, len(METALS))}")
             reader.fail(f"unknown metal '{name}'", "material", hint)
         return METALS[name]
     return texture(reader, "eta", 0.0, maximum=math.inf), texture(reader, "k", 1.0, maximum=math.inf)

@@ -72,7 +72,7 @@ W 4.37082 3.30025 2.99841 3.50064 2.60487 2.27323
 a-C 2.94405 2.22714 1.96816 0.887465 0.799299 0.81529
 d-C d-C_palik 2.70872 2.31883 2.2289 0 0 0
 """
-"""Mitsuba's names (two where its files hold the same), then eta and k in linear sRGB to six digits.
+"""All of Mitsuba's names (two where its files hold the same), then eta and k in linear sRGB to six digits.
 
 Made with Mitsuba 3.9.1, variant scalar_rgb, which converts its measured spectra (of SOPRA and Palik) under
 equal energy, though spectra in a scene under D65: for every file data/ior/NAME.eta.spd, ``p = mi.traverse(
@@ -92,3 +92,29 @@ def _read_metals() -> dict[str, tuple[tuple[float, ...], tuple[float, ...]]]:
 
 METALS = _read_metals()
 """Name -> (eta, k) of the complex index eta - i k, three numbers each."""
+
+COMMON_NAMES = {
+    "aluminium": "Al",
+    "aluminum": "Al",
+    "beryllium": "Be",
+    "chrome": "Cr",
+    "chromium": "Cr",
+    "copper": "Cu",
+    "gold": "Au",
+    "iridium": "Ir",
+    "lithium": "Li",
+    "mercury": "Hg",
+    "mirror": "none",
+    "molybdenum": "Mo",
+    "nickel": "Ni_palik",
+    "niobium": "Nb",
+    "potassium": "K",
+    "rhodium": "Rh",
+    "silver": "Ag",
+    "sodium": "Na_palik",
+    "tantalum": "Ta",
+    "titanium nitride": "TiN",
+    "tungsten": "W",
+    "vanadium": "V_palik",
+}
+"""What people write, and the name that is meant: for messages."""

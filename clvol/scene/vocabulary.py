@@ -55,6 +55,19 @@ def did_you_mean(name: str, candidates: Iterable[str]) -> str:
     return f"did you mean '{close[0]}'?" if close else ""
 
 
+def close_ones(name: str, candidates: Iterable[str]) -> str:
+    """The hint "did you mean 'x', 'y' or 'z'?" of names in any case that are close, else an empty string."""
+    if len(name) > LONGEST_NAME:
+        return ""
+    by_word: dict[str, list[str]] = {}
+    for candidate in candidates:
+        by_word.setdefault(candidate.lower(), []).append(candidate)
+    words = get_close_matches(name.lower(), by_word, n=3, cutoff=0.6)
+    close = [f"'{one}'" for word in words for one in by_word[word]]
+    together = " or ".join([", ".join(close[:-1]), close[-1]] if close[1:] else close)
+    return f"did you mean {together}?" if close else ""
+
+
 def _shared_start(one: str, other: str) -> int:
     return next(
         (n for n, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other))
