@@ -24,7 +24,7 @@ from clvol.rendering.light_cache import light_cache_unit
 from clvol.rendering.pool import Pool
 from clvol.rendering.profiler import Profiler, timed
 from clvol.rendering.residence import Residence, compiled
-from clvol.rendering.sizes import check_volumes, render_bytes
+from clvol.rendering.sizes import check_film, check_volumes, render_bytes
 from clvol.rendering.upload import upload_scene
 from clvol.rendering.wavefront import Wavefront
 from clvol.scene.digest import scene_digest
@@ -125,6 +125,7 @@ class Session:
         slots = Pool.for_device(device, plan, pool)
         groups, pixels = slots.slots // plan.tuning.group_slots, int(np.prod(record["film_size"]))
         residence, programs = Residence.of(prepared.scene, device), len(device.programs)
+        check_film(device.memory, plan, prepared.scene.film.window[2:], slots)
         uploaded_before = residence.uploaded
         if plan.features.volumes and not residence.has("bricks"):
             check_volumes(device.memory, prepared, render_bytes(plan, pixels, slots))

@@ -70,6 +70,41 @@ def render_bytes(plan: Plan, pixels: int, pool: Pool) -> int:
     return sum(film.values()) + sum(waves.values())
 
 
+def check_film(memory: DeviceMemory, plan: Plan, size: tuple[int, int], pool: Pool) -> None:
+    """DeviceError where a film of (width, height) pixels has no room, with a size that has."""
+    room = memory.room()
+    need = _film_bytes(memory, plan, math.prod(size), pool)
+    if need <= room and _largest_of_film(plan, math.prod(size)) <= memory.largest:
+        return
+    share = 1.0
+    while share > _LEAST_SHARE:
+        share *= _STEP
+        width, height = (max(1, int(n * share)) for n in size)
+        pixels = width * height
+        if _largest_of_film(plan, pixels) > memory.largest:
+            continue
+        if _film_bytes(memory, plan, pixels, pool) <= _MARGIN * room:
+            hint = f"{width} x {height} would fit: render fewer pixels, or tiles as crop windows of the film"
+            break
+    else:
+        hint = "render fewer pixels"
+    raise DeviceError(
+        f"a film of {math.prod(size)} pixels needs {format_bytes(need)}; {memory.name} has "
+        f"{format_bytes(room)}, and at most {format_bytes(memory.largest)} in one buffer",
+        hint=f"{hint}; or use a device with more memory",
+    )
+
+
+def _film_bytes(memory: DeviceMemory, plan: Plan, pixels: int, pool: Pool) -> int:
+    """That a film and its paths take at most at a time; making the picture comes from a shared memory too."""
+    picture = HOST_BYTES * pixels if memory.shared else 0
+    return max(render_bytes(plan, pixels, pool), sum(film_sizes(plan, pixels).values()) + picture)
+
+
+def _largest_of_film(plan: Plan, pixels: int) -> int:
+    return max(film_sizes(plan, pixels).values())
+
+
 def check_volumes(memory: DeviceMemory, prepared: PreparedScene, beside: int) -> None:
     """DeviceError where the bricks of a scene's volumes have no room, but so many other bytes do."""
     plural = "volume" if len(prepared.volumes) == 1 else "volumes"
@@ -80,7 +115,10 @@ def check_volumes(memory: DeviceMemory, prepared: PreparedScene, beside: int) ->
         return
     sizes = [volume.bricks.size for volume in prepared.volumes]
     fitting = _fitting(prepared, _MARGIN * room)
-    hint = f"on {_said(fitting)} points they would fit" if fitting else "render fewer pixels"
+    hint = "render fewer pixels"
+    if fitting:
+        share = min(new / old for new, old in zip(fitting[0], sizes[0], strict=True))
+        hint = f"on {_said(fitting)} points they would fit, {share:.2g} of these along each axis"
     had = _said(sizes)
     raise DeviceError(
         f"the bricks of the scene's {plural} ({had}) need {format_bytes(need)}; {memory.name} has "

@@ -91,7 +91,7 @@ def test_a_picture_without_room_is_refused_before_the_first_launch(monkeypatch):
     monkeypatch.setattr(device_memory, "available_memory", lambda: 200 << 20)
     monkeypatch.setattr(device.memory, "limit", device.memory.taken + (200 << 20))  # where tests left buffers
     big = picture([], [ConstantEmitter()], (0, 0, -2), (0, 0, 0), size=(1200, 1000))
-    with pytest.raises(DeviceError, match="a picture of 1200000 pixels needs"):
+    with pytest.raises(DeviceError, match=r"a film of 1200000 pixels needs .* x .* would fit"):
         clvol.render(big, spp=1)
 
 

@@ -92,10 +92,49 @@ def test_a_volume_of_four_times_the_devices_memory_is_refused_with_what_would_fi
     assert memory.taken == taken
     said = str(caught.value)
     need = re.search(r"need ([\d.]+) MiB", said)[1]
-    size = re.search(r"on (\d+) x \1 x \1 points", said)[1]
+    size, share = re.search(
+        r"on (\d+) x \1 x \1 points they would fit, (0\.\d+) of these along", said
+    ).groups()
+    assert float(share) == pytest.approx(int(size) / SIZE, abs=0.006)
     assert float(need) == pytest.approx(BRICKS / 2**20, rel=0.01) and device.description in said
     assert SIZE // 2 < int(size) < SIZE
     opened(device, {"data": noise(int(size))})
+
+
+def film_scene(width, height):
+    film = {"type": "hdrfilm", "width": width, "height": height}
+    return {
+        "type": "scene",
+        "sensor": {"type": "perspective", "film": film},
+        "light": {"type": "constant"},
+        "ball": {"type": "sphere"},
+    }
+
+
+def test_a_film_of_four_times_the_devices_memory_is_refused_with_what_would_fit(device, monkeypatch):
+    """Before anything is allocated or built; and what is said to fit does."""
+    memory, taken = device.memory, device.memory.taken
+    slots = Session.for_scene(
+        device, clvol.load_dict(film_scene(4, 4)), Choices(), 1, pool=256
+    ).wavefront.bytes
+    room = slots + 300 * 200 * 100  # some 400 bytes a pixel, of 300 x 200
+    monkeypatch.setattr(memory, "room", lambda: room - (memory.taken - taken))
+    monkeypatch.setattr(memory, "limit", taken + room)
+    built = len(device.programs)
+    with pytest.raises(clvol.DeviceError, match="tiles as crop windows") as caught:
+        clvol.render(clvol.load_dict(film_scene(300, 200)), spp=1, pool=256)
+    assert memory.taken == taken and len(device.programs) == built
+    said = str(caught.value)
+    assert "a film of 60000 pixels needs" in said and device.description in said
+    width, height = map(int, re.search(r"(\d+) x (\d+) would fit", said).groups())
+    assert 75 < width < 250 and height == pytest.approx(width * 2 / 3, abs=1)
+    for shape in (film_scene(width, height), film_scene(300, 200)):
+        scene = clvol.load_dict(shape)
+        if scene.film.width == 300:
+            film = {"type": "hdrfilm", "width": 300, "height": 200, "crop_offset_x": 100, "crop_offset_y": 60}
+            shape["sensor"]["film"] = film | {"crop_width": width, "crop_height": height}
+            scene = clvol.load_dict(shape)
+        assert clvol.render(scene, spp=1, pool=256).image.shape == (height, width, 3)
 
 
 def test_half_a_gibibyte_renders_within_two():

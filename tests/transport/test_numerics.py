@@ -207,7 +207,7 @@ def test_energy_lost_to_caps_is_the_share_of_each_path_in_the_image():
 def test_pictures_of_different_scenes_do_not_merge():
     a = clvol.render(scene_of(medium_of(3.0)), samples=(0, 4))
     b = clvol.render(scene_of(medium_of(9.0)), samples=(4, 4))
-    with pytest.raises(clvol.Error, match="digest"):
+    with pytest.raises(clvol.Error, match="different scenes"):
         clvol.merge([a, b])
 
 
