@@ -96,6 +96,7 @@ CASES = {
     "colours, spectral": Case(
         "colours", {}, {"technique": "spectral", "majorant": "grid", "probability": "max"}
     ),
+    "flakes": Case("flakes", {}, {"technique": "delta", "transmittance": "ratio"}),
     "flames": Case("flames", {}, {"majorant": "grid", "probability": "average"}, uninitialised=False),
     "within": Case("within", {}),
     "a meter": Case("a meter", {}),

@@ -196,6 +196,14 @@ def one_medium(**more: Any) -> clvol.Scene:
     )
 
 
+def flakes() -> clvol.Scene:
+    """Fog of microflakes under a sun."""
+    phase = {"type": "sggx", "S": "0.5, 0.9, 0.1, 0.1, 0, 0"}
+    fog = {"type": "heterogeneous", "sigma_t": field(CELLS), "albedo": 0.8, "scale": 6.0, "phase": phase}
+    sun = {"type": "directional", "direction": (0.2, -1.0, 0.5)}
+    return clvol.load_dict({"type": "scene", "sensor": pinhole(), "sun": sun, "fog": box(fog)})
+
+
 def within() -> clvol.Scene:
     """A camera in a ball of glass that is filled with fog."""
     fog = {"type": "homogeneous", "sigma_t": 0.5, "albedo": 0.8}
@@ -235,6 +243,7 @@ MADE = {
     "bends": lambda: balls(BENDS),
     "colours": colours,
     "flames": flames,
+    "flakes": flakes,
     "within": within,
     "a meter": plate,
     "far apart": far_apart,

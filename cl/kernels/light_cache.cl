@@ -5,6 +5,9 @@
 #include "density/transfer.h"
 #include "density/volume.h"
 #include "emitter/light_cache.h"
+#if CLVOL_PHASE_SGGX
+#include "phase/sggx.h"
+#endif
 #include "stages/medium_ray.h"
 
 #define CELL_POINTS 2 /* of a cell, along an axis, at which the extinction is looked up */
@@ -40,7 +43,11 @@ INLINE float least_extinction(const Scene *scene, float3 p)
             continue;
         __global const Volume *volume = scene->volumes + medium->sigma_t_volume;
         const float3 value = volume_value3(scene, volume, transform_point(volume->world_to_index, p));
+#if CLVOL_PHASE_SGGX
+        extinction += load_vector(medium->sigma_t) * density3_of(scene, medium, value) * mean_area(scene, medium);
+#else
         extinction += load_vector(medium->sigma_t) * density3_of(scene, medium, value);
+#endif
     }
     return min_of(extinction.x, min_of(extinction.y, extinction.z));
 }

@@ -15,6 +15,9 @@
 #if CLVOL_PHASE_TABPHASE
 #include "phase/tabphase.h"
 #endif
+#if CLVOL_PHASE_SGGX
+#include "phase/sggx.h"
+#endif
 
 INLINE float lobe_pdf(__global const Phase *lobe, float3 wo, float3 wi)
 {
@@ -25,6 +28,10 @@ INLINE float lobe_pdf(__global const Phase *lobe, float3 wo, float3 wi)
 #if CLVOL_PHASE_TABPHASE
     if (IS_PHASE(lobe, TABPHASE))
         return tabphase_pdf(lobe, wo, wi);
+#endif
+#if CLVOL_PHASE_SGGX
+    if (IS_PHASE(lobe, SGGX))
+        return sggx_pdf(lobe, wo, wi);
 #endif
     return isotropic_pdf(lobe, wo, wi);
 }
@@ -38,6 +45,10 @@ INLINE float3 lobe_sample(__global const Phase *lobe, float3 wo, float u, float 
 #if CLVOL_PHASE_TABPHASE
     if (IS_PHASE(lobe, TABPHASE))
         return tabphase_sample(lobe, wo, u, v, pdf);
+#endif
+#if CLVOL_PHASE_SGGX
+    if (IS_PHASE(lobe, SGGX))
+        return sggx_sample(lobe, wo, u, v, pdf);
 #endif
     return isotropic_sample(lobe, wo, u, v, pdf);
 }

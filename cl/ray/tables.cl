@@ -21,7 +21,10 @@ __kernel void tables(CLVOL_ARGUMENTS, __global const float *given, __global floa
         for (uint c = 0; c < channels; ++c) {
             MediumRay in = given_ray(&scene, given);
             const float t = ((float)i + 0.5f) * (in.t_max / (float)points);
-            const float scale = in.medium->sigma_t[c] * given[7];
+            float scale = in.medium->sigma_t[c] * given[7];
+#if CLVOL_PHASE_SGGX
+            scale *= projected_area(&scene, in.medium, in.world_ray.d);
+#endif
 #if CLVOL_HAS_HETEROGENEOUS
             __global const Volume *volume = scene.volumes + in.medium->sigma_t_volume;
             if (!is_homogeneous(in.medium))

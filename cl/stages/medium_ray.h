@@ -2,6 +2,9 @@
 #ifndef CLVOL_STAGES_MEDIUM_RAY_H
 #define CLVOL_STAGES_MEDIUM_RAY_H
 #if CLVOL_HAS_MEDIA
+#if CLVOL_PHASE_SGGX
+#include "phase/sggx.h"
+#endif
 #include "tracking/interface.h"
 
 INLINE bool is_homogeneous(__global const Medium *medium)
@@ -23,6 +26,9 @@ INLINE MediumRay medium_ray(const Scene *scene, __global const Medium *medium, R
     in.scale = load_vector(medium->sigma_t);
 #else
     in.scale = medium->sigma_t[channel];
+#endif
+#if CLVOL_PHASE_SGGX
+    in.scale *= projected_area(scene, medium, world.d);
 #endif
     in.rate = extinction_max(in.scale);
 #if CLVOL_HAS_HETEROGENEOUS

@@ -47,7 +47,7 @@ ARGUMENTS = (
     Argument("transfers", "__global const Transfer *", "CLVOL_HAS_TRANSFER"),
     Argument("transfer_points", "__global const float4 *", "CLVOL_HAS_TRANSFER"),  # value and colour
     Argument("blackbody", "__global const float *", "CLVOL_HAS_TEMPERATURE"),
-    Argument("phases", "__global const Phase *", "CLVOL_HAS_SCATTERING"),
+    Argument("phases", "__global const Phase *", "CLVOL_HAS_PHASES"),
     Argument("emitters", "__global const Emitter *", "CLVOL_HAS_EMITTERS"),
     Argument("light_cache", "__global const LightCache *", "CLVOL_LIGHT_CACHE"),
     Argument("light_transmittance", "__global const float *", "CLVOL_LIGHT_CACHE"),

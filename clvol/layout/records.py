@@ -76,7 +76,7 @@ TRANSFER = _record(
 
 PHASE = _record(
     ("kind", "i", 1),  # PHASE_ISOTROPIC, PHASE_HG, …
-    ("g", "f", 1),  # of a tabphase: the bits of an int, its table's distance in records
+    ("g", "f", 1),  # of a tabphase or sggx: the bits of an int, its table's distance in records
     ("weight", "f", 1),  # share of the medium's phase function; within a medium, the smallest first
 )
 
@@ -226,12 +226,12 @@ RECORDS = {
 RARE_RECORDS = {"Glow": "CLVOL_HAS_GLOW", "MeterFace": "CLVOL_HAS_METER"}
 """Records that few scenes have, and the macro that says so: what others compile does not hold them."""
 
-RARE_KINDS = {"TEXTURE_VOLUME": "CLVOL_HAS_VOLUME_TEXTURES"}
+RARE_KINDS = {"TEXTURE_VOLUME": "CLVOL_HAS_VOLUME_TEXTURES", "PHASE_SGGX": "CLVOL_PHASE_SGGX"}
 """The same of numbered kinds."""
 
 ENUMS = {
     "SHAPE": ("NONE", "CUBE", "SPHERE"),
-    "PHASE": ("ISOTROPIC", "HG", "RAYLEIGH", "TABPHASE"),
+    "PHASE": ("ISOTROPIC", "HG", "RAYLEIGH", "TABPHASE", "SGGX"),
     "TRANSFER": ("SIGMA_T", "ALBEDO", "EMISSION"),  # in the order of a medium's entries
     "EMITTER": ("CONSTANT", "ENVMAP", "DIRECTIONAL", "POINT", "SPOT", "AREA", "SUN", "PROJECTOR"),
     "METER": ("TRIANGLE", "SPHERE", "DISK", "CYLINDER"),

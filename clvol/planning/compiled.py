@@ -56,6 +56,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_HAS_BLEND": int(f.blend),
         "CLVOL_HAS_VARIED_PHASE": int(f.varied_phases),
         "CLVOL_HAS_SCATTERING": int(f.scattering),
+        "CLVOL_HAS_PHASES": int(f.scattering or "SGGX" in f.phases),
         "CLVOL_HAS_EMITTERS": int(f.emitters > 0),
         "CLVOL_HAS_NEAR_LIGHTS": int(f.near_lights),
         "CLVOL_HAS_CONSTANT": int(f.constant),

@@ -113,10 +113,10 @@ class Features:
     def peaked(self) -> bool:
         """Some phase function has a peak, and some light is found by next-event estimation alone.
 
-        All have to have a convolution in closed form (cl/phase/convolution.h), which tables lack, and the
-        same everywhere.
+        All have to have a convolution in closed form (cl/phase/convolution.h), which tables and flakes
+        lack, and the same everywhere.
         """
-        closed = "HG" in self.phases and "TABPHASE" not in self.phases and not self.varied_phases
+        closed = "HG" in self.phases and not {"TABPHASE", "SGGX"} & {*self.phases} and not self.varied_phases
         return closed and (self.directional or self.lit_by_points)
 
     @property

@@ -80,8 +80,8 @@ def reasons(plan: Decisions) -> dict[str, str]:
         "sampler": "",
         "shadow_cache": "no shadow ray passes a heterogeneous medium",
         "light_choice": "there is one light at most to sample",
-        "next_event": "a phase function by table has no closed form for the control"
-        if "TABPHASE" in features.phases and used["next_event"] == "plain"
+        "next_event": "a phase function by table or of flakes has no closed form for the control"
+        if {"TABPHASE", "SGGX"} & {*features.phases} and used["next_event"] == "plain"
         else "no light is sampled in media",
         "lanes": "; ".join(dict.fromkeys(against(plan).values())) or "no walk goes from look-up to look-up",
     }

@@ -15,6 +15,7 @@ from clvol.scene import (
     bsdf,
     classified,
     emitter,
+    flakes,
     groups,
     integrator,
     medium,
@@ -121,6 +122,7 @@ PLUGINS: PluginTable = {
         "rayleigh": phase.rayleigh,
         "blendphase": phase.blendphase,
         "tabphase": tabulated.tabphase,
+        "sggx": flakes.sggx,
     },
     "emitter": {
         "constant": emitter.constant,

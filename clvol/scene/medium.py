@@ -145,6 +145,10 @@ def own_volume(reader: Reader, name: str, expected: str) -> Volume:
     if not found:
         reader.refuse_plugin(name, expected)
     volume: Volume = reader.build(found[0][1])
+    if channels_of(volume) == 6:
+        reader.fail(
+            f"'{name}' has six channels: they are for the S of an sggx alone", name, f"give {expected}"
+        )
     return volume
 
 

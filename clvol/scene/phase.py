@@ -45,6 +45,8 @@ def blendphase(reader: Reader) -> BlendPhase:
         where = found[2][0] if len(found) > 2 else ""
         reader.fail(f"a blendphase takes two phase functions, got {len(found)}", where)
     blend = BlendPhase(weight, *(reader.build(node) for _, node in found))
+    if any(lobe.kind == "sggx" for lobe in _all_lobes(blend)):
+        reader.unsupported("an sggx in a mixture is not supported", hint="its extinction goes by direction")
     if _leaves(blend) > MAX_LOBES:
         reader.fail(f"a mixture takes at most {MAX_LOBES} phase functions, got {_leaves(blend)}")
     if sum(_varied(blend)) > 1:
@@ -70,6 +72,12 @@ def _varied(phase: PhaseFunction) -> list[bool]:
     if not isinstance(phase, BlendPhase):
         return []
     return [isinstance(phase.weight, GridVolume), *_varied(phase.first), *_varied(phase.second)]
+
+
+def _all_lobes(phase: PhaseFunction) -> list[Phase]:
+    if isinstance(phase, BlendPhase):
+        return [*_all_lobes(phase.first), *_all_lobes(phase.second)]
+    return [phase]
 
 
 def _leaves(phase: PhaseFunction) -> int:

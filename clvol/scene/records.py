@@ -163,11 +163,12 @@ class PhaseTable:
 
 @dataclass(frozen=True)
 class Phase:
-    """Phase function: "isotropic", "rayleigh", "hg" (Henyey–Greenstein) with mean cosine g, or "tabphase"."""
+    """Phase function: "isotropic", "rayleigh", "hg" (Henyey–Greenstein of g), "tabphase" or "sggx"."""
 
     kind: str = "isotropic"
     g: float = 0.0
     table: PhaseTable | None = None  # of a tabphase
+    flakes: tuple[float, ...] | None = None  # of an sggx: xx, yy, zz, xy, xz, yz of its matrix S
 
 
 @dataclass(frozen=True)

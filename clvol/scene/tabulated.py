@@ -26,20 +26,20 @@ def tabphase(reader: Reader) -> Phase:
     """
     if not reader.has("values"):
         reader.fail("a tabphase needs values", hint="of the cosines -1 to 1, as '0.5, 1, 2'")
-    values = _numbers(reader, "values")
-    angles = _numbers(reader, "angles") if reader.has("angles") else ()
+    values = numbers(reader, "values")
+    angles = numbers(reader, "angles") if reader.has("angles") else ()
     table = PhaseTable(values, angles)
     if fault := table_fault(table):
         reader.fail(f"{fault[1]} of a tabphase", fault[0])
     return Phase("tabphase", table=table)
 
 
-def _numbers(reader: Reader, name: str) -> tuple[float, ...]:
+def numbers(reader: Reader, name: str) -> tuple[float, ...]:
     """Numbers between commas or blanks, or an array of one axis."""
     if not isinstance(reader.raw(name), str):
         array = np.ma.filled(reader.array(name).astype(np.float64), np.nan)
         if array.ndim != 1:
-            reader.fail(f"'{name}' of a tabphase must be numbers in a row", name)
+            reader.fail(f"'{name}' of a {reader.type} must be numbers in a row", name)
         return tuple(array.tolist())
     words = reader.string(name, "").replace(",", " ").split()
     numbers = []
@@ -47,7 +47,7 @@ def _numbers(reader: Reader, name: str) -> tuple[float, ...]:
         try:
             numbers.append(float(word))
         except ValueError:
-            reader.fail(f"'{name}' of a tabphase has '{shortened(word, 40)}', which is no number", name)
+            reader.fail(f"'{name}' of a {reader.type} has '{shortened(word, 40)}', which is no number", name)
     return tuple(numbers)
 
 

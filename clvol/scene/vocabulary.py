@@ -22,7 +22,6 @@ LATER: dict[str, tuple[str, ...]] = {
         *("measured", "measured_polarized", "hair"),
         *("pplastic", "polarizer", "retarder", "circular"),
     ),
-    "phase": ("sggx",),
 }
 """Kind -> plugins known by name and not supported in this version."""
 

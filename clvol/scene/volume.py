@@ -18,7 +18,8 @@ from clvol.volumes.files import place
 from clvol.volumes.grid import DenseGrid, Grid, SparseGrid
 from clvol.volumes.labelled import grid_from_labelled, is_labelled
 from clvol.volumes.level_set import USES, fog_of
-from clvol.volumes.read import read_sparse
+from clvol.volumes.read import read_sparse, volume_suffix
+from clvol.volumes.vol import read_vol
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 log = logging.getLogger("clvol")
 
 FILTER_TYPES = ("trilinear", "nearest")
+CHANNELS = (1, 3, 6)
+"""Of a gridvolume; six are for the S of an sggx alone."""
 WRAP_MODES = ("clamp", "repeat", "mirror")
 
 
@@ -124,12 +127,19 @@ def _grid(reader: Reader) -> Grid:
         where = reader.node.place(sources[0])
         if is_labelled(reader.node[sources[0]]):
             return grid_from_labelled(reader.raw(sources[0]), where)
-        return dense_from_array(reader.array(sources[0]), source=where)
+        return dense_from_array(reader.array(sources[0]), source=where, channels=CHANNELS)
     path, inside = find_volume(reader, "filename")
     if inside is not None and name is not None:
         reader.fail(f"the filename names an array itself, '{inside}'", "grid", "give one of them")
     name = inside if name is None else name
-    return _read(reader, path, name, read_volume)
+    return _read(reader, path, name, _read_volume)
+
+
+def _read_volume(path: Path, name: str | None) -> Grid:
+    """Of any format; of Mitsuba's with six channels too."""
+    if name is None and volume_suffix(path) == ".vol":
+        return read_vol(path, CHANNELS)
+    return read_volume(path, name)
 
 
 def _read(reader: Reader, path: Path, name: str | None, read: Callable[[Path, str | None], Grid]) -> Grid:

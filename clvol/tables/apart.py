@@ -8,6 +8,7 @@ import numpy as np
 
 from clvol.accel.bounds import classified
 from clvol.scene import records
+from clvol.scene.flakes import largest_area
 from clvol.volumes.bricks import BrickMap
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def peak_extinction(medium: records.Medium, density: PreparedVolume | None) -> np.ndarray:
-    """Largest sigma_t of each channel, per world length, float64 (3,).
+    """Largest sigma_t of each channel in any direction, per world length, float64 (3,).
 
     `density`: the volume that is the medium's sigma_t; None where it is homogeneous.
     """
@@ -27,7 +28,8 @@ def peak_extinction(medium: records.Medium, density: PreparedVolume | None) -> n
     else:
         assert density is not None
         densest = density.peak(medium.transfer("sigma_t"))
-    return np.broadcast_to(densest, 3) * np.broadcast_to(np.asarray(medium.scale, np.float64), 3)
+    densest = np.broadcast_to(densest, 3) * np.broadcast_to(np.asarray(medium.scale, np.float64), 3)
+    return densest * largest_area(medium.phase)
 
 
 def depth_across(matter: Matter, volumes: Sequence[PreparedVolume]) -> float:
@@ -49,7 +51,8 @@ def depth_across(matter: Matter, volumes: Sequence[PreparedVolume]) -> float:
     low, high = (side.mean(axis=(0, 1, 2), dtype=np.float64) for side in (low, high))
     mean = 0.75 * low + 0.25 * high
     edges = volume.voxel * bricks.size
-    return float(np.max(mean * np.array(matter.media[0].scale)) * edges.mean())
+    scale = np.array(matter.media[0].scale) * largest_area(matter.media[0].phase)
+    return float(np.max(mean * scale) * edges.mean())
 
 
 def channels_apart(matter: Matter, volumes: Sequence[PreparedVolume]) -> float:

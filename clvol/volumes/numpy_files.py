@@ -35,7 +35,9 @@ DEFLATE_RATIO = 1032
 ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError, ValueError, RuntimeError)
 
 
-def dense_from_array(array: ArrayLike, name: str = "", source: str = "") -> DenseGrid:
+def dense_from_array(
+    array: ArrayLike, name: str = "", source: str = "", channels: tuple[int, ...] = (1, 3)
+) -> DenseGrid:
     """An array as a grid on the unit cube.
 
     Parameters
@@ -44,6 +46,7 @@ def dense_from_array(array: ArrayLike, name: str = "", source: str = "") -> Dens
         channels.  It is copied, as float32, so that what is done to it later does not reach the grid.
         Masked samples have no value, and become 0, which a warning counts.
     name, source : what error messages call it.
+    channels : numbers of them that are taken.
 
     Raises VolumeError for other shapes and types.
     """
@@ -52,7 +55,7 @@ def dense_from_array(array: ArrayLike, name: str = "", source: str = "") -> Dens
         given = as_array(array)
     except (TypeError, ValueError) as error:
         raise VolumeError(f"is not an array ({error})", where) from None
-    check_layout(given.dtype, given.shape, where)
+    check_layout(given.dtype, given.shape, where, channels)
     values, narrowed = allocate(given.shape, np.float32, where), Narrowing(where)
     masked = masked_count(given)
     planes = max(CHUNK // (given.dtype.itemsize * math.prod(given.shape[1:])), 1)
@@ -72,7 +75,9 @@ def _grid(values: np.ndarray, name: str, source: str) -> DenseGrid:
     return DenseGrid(values, np.array([[0, 0, 0], [1, 1, 1]], np.float64), name, source)
 
 
-def check_layout(dtype: np.dtype, shape: tuple[int, ...], where: str) -> None:
+def check_layout(
+    dtype: np.dtype, shape: tuple[int, ...], where: str, channels: tuple[int, ...] = (1, 3)
+) -> None:
     """VolumeError unless an array can be a grid: real numbers, [z, y, x] or [z, y, x, 1 or 3], not empty."""
     if dtype.kind not in "biuf":
         raise VolumeError(f"an array of {dtype} is not supported, real numbers are", where)
@@ -82,7 +87,7 @@ def check_layout(dtype: np.dtype, shape: tuple[int, ...], where: str) -> None:
         if len(shape) == 5:
             hint += "; of (t, z, y, x, channel) one time is array[0]"
         raise VolumeError(axes, where, hint)
-    if len(shape) == 4 and shape[3] not in (1, 3):
+    if len(shape) == 4 and shape[3] not in channels:
         hint = "if the axes are (t, z, y, x), give one time of it, as array[0]; of others one array [z, y, x]"
         if shape[0] in (1, 3):
             hint = "put the channels last: numpy.moveaxis(array, 0, -1)"

@@ -19,11 +19,11 @@ HEADER = struct.Struct("<3sB5i6f")
 VERSION, FLOAT32 = 3, 1
 
 
-def read_vol(path: str | os.PathLike[str]) -> DenseGrid:
-    """A .vol file (version 3, float32, 1 or 3 channels).
+def read_vol(path: str | os.PathLike[str], channels_taken: tuple[int, ...] = (1, 3)) -> DenseGrid:
+    """A .vol file (version 3, float32, 1 or 3 channels, or others that are taken).
 
     Bytes after the samples are ignored, as Mitsuba does.  Raises VolumeError for a missing, damaged
-    or truncated file, other versions and types, and 6 channels.
+    or truncated file, other versions and types, and other numbers of channels.
     """
     where = str(path)
     with open_binary(path) as file:
@@ -34,7 +34,7 @@ def read_vol(path: str | os.PathLike[str]) -> DenseGrid:
         if len(header) < HEADER.size:
             raise VolumeError(f"its header takes {HEADER.size} bytes, the file has {size}", where, TRUNCATED)
         _, version, kind, nx, ny, nz, channels, *corners = HEADER.unpack(header)
-        _check_header(where, version, kind, (nx, ny, nz), channels)
+        _check_header(where, version, kind, (nx, ny, nz), channels, channels_taken)
         count = nx * ny * nz * channels
         if HEADER.size + 4 * count > size:
             raise VolumeError(
@@ -52,12 +52,14 @@ def read_vol(path: str | os.PathLike[str]) -> DenseGrid:
     return DenseGrid(values=values, box=box, name=Path(path).stem, source=where)
 
 
-def _check_header(where: str, version: int, kind: int, size: tuple[int, int, int], channels: int) -> None:
+def _check_header(
+    where: str, version: int, kind: int, size: tuple[int, int, int], channels: int, taken: tuple[int, ...]
+) -> None:
     if version != VERSION:
         raise VolumeError(f"version {version} of the format is not supported, {VERSION} is", where)
     if kind != FLOAT32:
         raise VolumeError(f"samples of type {kind} are not supported, float32 (type {FLOAT32}) is", where)
-    if channels not in (1, 3):
+    if channels not in taken:
         raise VolumeError(f"{channels} channels are not supported, 1 and 3 are", where)
     if min(size) < 1:
         raise VolumeError(f"its size {' x '.join(map(str, size))} is empty", where, TRUNCATED)

@@ -13,6 +13,7 @@ import trimesh
 from mesh_files import ascii_ply, serialized, serialized_mesh
 
 from clvol.volumes import write_vol
+from clvol.volumes.vol import FLOAT32, HEADER, VERSION
 
 SCENES = sorted((Path(__file__).parents[1] / "mitsuba").glob("*.xml"))
 
@@ -49,6 +50,9 @@ def write_files(folder):
     tilts = np.random.default_rng(3).normal(size=(4, 3, 4, 3)) * (0.3, 0.3, 0) + (0, 0, 1)
     tilts /= np.linalg.norm(tilts, axis=-1, keepdims=True)
     write_vol(folder / "tilts.vol", (0.5 + 0.5 * tilts).astype(np.float32), unit)
+    _write_flakes(folder / "flakes.vol", (0.3, 0.9, 0.2, 0.1, -0.05, 0.15))
+    _write_flakes(folder / "even.vol", (0.6, 0.6, 0.6, 0, 0, 0))
+    _write_flakes(folder / "fibres.vol", (0.9, 0.9, 0.02, 0, 0, 0))
     (folder / "smooth.ply").write_bytes(_smooth_ply())
     (folder / "strands.txt").write_text(STRANDS)
     (folder / "painted.ply").write_bytes(_painted_ply())
@@ -64,6 +68,12 @@ def _write_image(path, pixels):
     out.open(str(path), oiio.ImageSpec(width, height, channels, str(pixels.dtype)))
     out.write_image(pixels)
     out.close()
+
+
+def _write_flakes(path, flakes):
+    """A volume of one sample with six channels, for an sggx."""
+    header = HEADER.pack(b"VOL", VERSION, FLOAT32, 1, 1, 1, 6, 0, 0, 0, 1, 1, 1)
+    path.write_bytes(header + np.array(flakes, "<f4").tobytes())
 
 
 def _pair():

@@ -340,6 +340,10 @@ PARAMETERS = {
     "hg": ({}, {"g": 0.3}),
     "rayleigh": ({}, {}),
     "tabphase": ({"values": "1, 2, 3"}, {"values": "1, 2, 4", "angles": "0, 40, 180"}),
+    "sggx": (
+        {"S": "1, 2, 3, 0.1, 0.2, 0.3"},
+        {"S": {"type": "gridvolume", "data": np.broadcast_to([1, 2, 4, 0.1, 0.2, 0.3], (1, 1, 1, 6))}},
+    ),
     "blendphase": (
         {"weight": 0.5, "a": {"type": "isotropic"}, "b": {"type": "rayleigh"}},
         {"weight": VOLUME, "a": {"type": "hg"}, "b": {"type": "hg"}},

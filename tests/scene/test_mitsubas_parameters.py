@@ -66,6 +66,7 @@ MITSUBAS = {
     "heterogeneous": "albedo has_spectral_extinction sample_emitters scale sigma_t",
     "hg": "g",
     "tabphase": "values",
+    "sggx": "S",
     "blendphase": "weight",
     "constvolume": "to_world value",
     "gridvolume": "accel data filename filter_type grid max_value raw to_world use_grid_bbox wrap_mode",

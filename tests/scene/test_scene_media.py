@@ -319,7 +319,7 @@ def test_mixtures_cannot_grow_without_end():
     [
         ({"type": "hg", "g": 1.0}, "must be in (-1, 1)"),
         ({"type": "rayleigh", "g": 0.5}, "unknown parameter 'g' of phase 'rayleigh'"),
-        ({"type": "sggx"}, "phase 'sggx' is not supported in this version; supported: isotropic"),
+        ({"type": "sggx"}, "an sggx needs S"),
         ({"type": "tabphase"}, "a tabphase needs values"),
         (TABLE | {"values": "1"}, "phase.values: there must be 2 to 65536 values, not 1, of a tabphase"),
         (TABLE | {"values": "1, x2"}, "'values' of a tabphase has 'x2', which is no number"),
@@ -346,7 +346,7 @@ def test_mixtures_cannot_grow_without_end():
             BLEND | {"c": {"type": "isotropic"}},
             "scene.cube.interior.phase.c: a blendphase takes two phase functions, got 3",
         ),
-        (BLEND | {"a": {"type": "sggx"}}, "scene.cube.interior.phase.a: phase 'sggx' is not supported"),
+        (BLEND | {"a": {"type": "sggy"}}, "scene.cube.interior.phase.a: unknown plugin 'sggy'"),
         (BLEND | {"a": {"type": "sphere"}}, "takes two phase functions, got 1"),
     ],
 )
