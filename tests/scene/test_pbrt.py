@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 import clvol
 from clvol.cli.main import main
-from clvol.scene.materials import Blend, Dielectric, TwoSided
+from clvol.scene.materials import Blend, Dielectric, NormalMap, TwoSided
 from clvol.scene.records import ConstantEmitter, ConstVolume, GridVolume
 
 CAMERA = """
@@ -230,6 +230,49 @@ def test_a_picture_is_scaled_before_it_is_inverted(load, tmp_path, given, expect
     found = scene.shapes[0].bsdf.front.reflectance
     assert found.pixels[..., 1] == pytest.approx(expected(texels))
     assert (found.to_uv @ [0.25, 0.25, 1])[:2] == pytest.approx([0.25, 0.75])
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("row", [0, 1])
+def test_a_normalmap_bends_about_the_surfaces_own_frame(load, tmp_path, row, side, reverse):
+    """As pbrt's `NormalMap`: x along dp/du, y = n x x, the file's last row at v = 0; both sides alike."""
+    normals = np.array([[0.5, 0.3, 0.8], [-0.2, 0.45, 0.9]])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    pixels = ((normals[:, None] + 1) / 2).astype(np.float32)
+    (tmp_path / "n.pfm").write_bytes(b"PF\n1 2\n-1\n" + pixels[::-1].tobytes())  # from the bottom up
+    place, sun = np.array([0.2, (0.5, -0.5)[row], 0.0]), np.array([0.1, -0.25, 1.0])
+    eye = place + np.array([0.3, 0.2, 4.0])
+    eye[2] *= side
+    sun[2] *= side
+    camera = f"""
+        LookAt {" ".join(map(str, eye))}  {" ".join(map(str, place))}  0 1 0
+        Camera "perspective" "float fov" 0.02
+        Film "rgb" "integer xresolution" 4 "integer yresolution" 4
+        Integrator "path" "integer maxdepth" 1"""
+    scene = load(
+        f"""LightSource "distant" "rgb L" [1 1 1] "point3 to" [0 0 0]
+            "point3 from" [{" ".join(map(str, sun))}]
+        {"ReverseOrientation" if reverse else ""}
+        Material "diffuse" "rgb reflectance" [.6 .6 .6] "string normalmap" "n.pfm"
+        Shape "trianglemesh" "point3 P" [-1 -1 0 1 -1 0 1 1 0 -1 1 0] "point2 uv" [0 0 1 0 1 1 0 1]
+        "integer indices" [0 1 2 0 2 3]""",
+        camera,
+    )
+    assert isinstance(scene.shapes[0].bsdf, NormalMap)
+    n, x = np.array([0.0, 0, -1 if reverse else 1]), np.array([1.0, 0, 0])
+    bent = normals[row] @ [x, np.cross(n, x), n]
+    expected = 0.6 / np.pi * abs(bent @ sun) / np.linalg.norm(sun)
+    assert clvol.render(scene, spp=16).image == pytest.approx(expected, rel=2e-3)
+
+
+def test_a_normalmap_of_a_mix_is_refused_and_one_that_is_missing_told(load):
+    named = 'MakeNamedMaterial "a" "string type" "diffuse" '
+    mix = 'Material "mix" "string materials" ["a" "a"] "string normalmap" "n.pfm" Shape "sphere"'
+    with pytest.raises(clvol.SceneError, match="the normalmap of a mix cannot be rendered"):
+        load(named + mix)
+    with pytest.raises(clvol.SceneError, match=r"n\.pfm"):
+        load('Material "diffuse" "string normalmap" "n.pfm" Shape "sphere"')
 
 
 def test_a_scaled_texture_is_a_product(load, tmp_path):

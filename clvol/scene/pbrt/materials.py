@@ -71,10 +71,24 @@ class Materials:
         self._depth += 1
         made = builder(self, thing, parameters)
         self._depth -= 1
-        for name in ("displacement", "normalmap"):
-            if parameters.get(name) is not None:
-                self.context.say(f"'{name}' of materials is left out", parameters.place(name))
+        if parameters.get("displacement") is not None:
+            self.context.say("'displacement' of materials is left out", parameters.place("displacement"))
+        made = self._bent(made, thing, parameters)
         parameters.finish()
+        return made
+
+    def _bent(self, bsdf: Node, thing: Thing, parameters: Parameters) -> Node:
+        """The BSDF under the normals of a picture, if the material names one; alike on both sides."""
+        if parameters.get("normalmap") is None:
+            return bsdf
+        if thing.type == "mix":
+            parameters.refuse("the normalmap of a mix", parameters.place("normalmap"), "give it to its parts")
+        said = "light that meets a surface and its normalmap from different sides is left out"
+        self.context.say(said, parameters.place("normalmap"))
+        flags = dict.fromkeys(("flip_invalid_normals", "use_shadowing_function"), False)
+        normals = self.textures.normals(parameters, "normalmap")
+        made = self._bsdf("normalmap", thing, normalmap=normals, **flags)
+        made.add_nameless(bsdf)
         return made
 
     # -- the materials -------------------------------------------------------------------------------

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from clvol.scene.pbrt.parameters import Parameters
     from clvol.scene.pbrt.statements import Thing
 
+FLIPPED = np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]])
+"""From pbrt's (u, v) to a bitmap's: its first row is at v = 1."""
 _WRAPS = {"repeat": "repeat", "clamp": "clamp", "black": "clamp", "octahedralsphere": "repeat"}
 
 
@@ -84,6 +86,12 @@ class Textures:
         if isinstance(texture, Board):
             return float(np.mean(texture.colors))
         return float(self._pixels(texture).mean())
+
+    def normals(self, parameters: Parameters, name: str) -> Node:
+        """The picture of normals in a file, as it is stored."""
+        path = find(parameters.string(name, ""), self.context.folders, parameters.place(name))
+        where = parameters.place(name)
+        return self.context.node("texture", "bitmap", where, filename=str(path), raw=True, to_uv=FLIPPED)
 
     def value(self, texture: Texture, where: str) -> Node:
         """A texture as the value of a node's parameter."""
@@ -188,10 +196,9 @@ class Textures:
         wrap = parameters.string("wrap", "repeat", tuple(_WRAPS))
         if wrap == "black":
             self.context.say("pictures with black round them are taken as clamped", parameters.place("wrap"))
-        flipped = np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]])  # pbrt's first row is at v = 1
         return Picture(
             str(path),
-            flipped @ _to_uv(parameters),
+            FLIPPED @ _to_uv(parameters),
             "nearest" if smooth == "point" else "bilinear",
             _WRAPS[wrap],
             encoding == "linear",
