@@ -93,9 +93,8 @@ def _check_xml(path: Path) -> None:
     if head.startswith(b"<") or (not what and path.suffix.lower() == ".xml"):
         return
     known = f"scenes are Mitsuba's .xml, volumes {', '.join(SUFFIXES[:5])} and others"
-    raise SceneError(
-        f"is {what + ', ' if what else ''}neither a scene nor a volume", str(path), hint or known
-    )
+    neither = "not a scene" if "volume" in what else "neither a scene nor a volume"
+    raise SceneError(f"is {what + ', ' if what else ''}{neither}", str(path), hint or known)
 
 
 TEXT = "the text"

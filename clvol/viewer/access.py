@@ -28,7 +28,7 @@ def listening(host: str, port: int) -> socket.socket:
         return socket.create_server((host, port), family=family)
     except (OSError, OverflowError, UnicodeError) as error:
         raise OptionError(
-            f"cannot listen on {host}, port {port}: {error}", hint="choose another --port"
+            f"cannot listen on {host}, port {port}: {error}", hint="choose another --host or --port"
         ) from None
 
 

@@ -26,6 +26,7 @@ EXR = encode_exr(split_channels("", np.ones((2, 2, 3), np.float32)), {})
         ("renamed.xml", b"\x89PNG\r\n\x1a\n", "is a PNG picture"),
         ("a.md", b"# Smoke\n", "is a text, .*scenes are Mitsuba's .xml"),
         ("a.blend", b"BLENDER-v300", "is a Blender file, .*export its volumes as .vdb"),
+        ("renamed.xml", b" BDV" + bytes(60), "is an OpenVDB volume, not a scene; "),
         ("a.xyz", b"1 2 3\n", "is neither a scene nor a volume; scenes are .*volumes .vdb"),
         ("a.xml", b"", "is empty"),
         ("a.xml", b"v 0 0 0", "broken XML"),

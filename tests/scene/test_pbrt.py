@@ -316,12 +316,19 @@ def test_what_cannot_be_rendered_is_told_at_once(load):
         ('Scale 0 1 1 Shape "sphere"', "flattens space"),
         ('Shape "sphere" "float radius" [1', "without its ']'"),
         ('Shape "sphere', "a string without its end"),
+        ('Shape "sphere" WorldEnd', "WorldEnd is of scenes before PBRT-v4; `pbrt --upgrade"),
     ],
 )
 def test_mistakes_are_told_where_they_are(load, world, told):
     with pytest.raises(clvol.SceneError) as caught:
         load(world)
     assert told in str(caught.value) and "scene.pbrt:" in str(caught.value)
+
+
+def test_a_mark_of_the_byte_order_is_no_statement(tmp_path):
+    path = tmp_path / "scene.pbrt"
+    path.write_text(f'{CAMERA} WorldBegin Shape "sphere"', encoding="utf-8-sig")
+    assert len(clvol.load_file(path).shapes) == 1
 
 
 @pytest.mark.parametrize("text", ["", "# nothing\n", CAMERA])

@@ -56,6 +56,9 @@ class Directives:
             if token.kind != "word":
                 raise SceneError(f"expected a statement, got '{shortened(token.text, 60)}'", token.where)
             handler = _HANDLERS.get(token.text)
+            if token.text == "WorldEnd":
+                hint = "`pbrt --upgrade FILE` writes one of PBRT-v4"
+                raise SceneError("WorldEnd is of scenes before PBRT-v4", token.where, hint)
             if handler is None:
                 hint = join_hints(did_you_mean(token.text, _HANDLERS), f"supported: {listed(_HANDLERS)}")
                 raise SceneError(f"unknown statement '{shortened(token.text, 60)}'", token.where, hint)

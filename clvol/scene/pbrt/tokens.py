@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import gzip
 import re
 import zlib
@@ -93,7 +94,8 @@ class Tokens:
         self._files += 1
         if len(self._open) >= MAX_OPEN or self._files > MAX_FILES:
             raise SceneError("the scene includes too many files", where, f"at most {MAX_FILES}")
-        self._open.append(_Source(read_bytes(path, where), str(path), resolved))
+        text = read_bytes(path, where).removeprefix(codecs.BOM_UTF8)
+        self._open.append(_Source(text, str(path), resolved))
 
     @property
     def depth(self) -> int:
