@@ -96,7 +96,7 @@ CASES = {
     "colours, spectral": Case(
         "colours", {}, {"technique": "spectral", "majorant": "grid", "probability": "max"}
     ),
-    "flakes": Case("flakes", {}, {"technique": "delta", "transmittance": "ratio"}),
+    "flakes": Case("flakes", {}, {"technique": "delta", "majorant": "grid", "shadow_cache": "off"}),
     "flames": Case("flames", {}, {"majorant": "grid", "probability": "average"}, uninitialised=False),
     "within": Case("within", {}),
     "a meter": Case("a meter", {}),
