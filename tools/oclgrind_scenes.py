@@ -173,7 +173,8 @@ def flames() -> clvol.Scene:
     """Emission of two media that overlap, one of them classified, seen in parallel under a sun."""
     fire = {"type": "heterogeneous", "sigma_t": field(CELLS), "emission": field(CELLS), "scale": 3.0}
     values = {"type": "classified", "values": field(CELLS), "opacity": "0: 0, 1: 4", "albedo": 0.7}
-    sensor = {"type": "orthographic", "to_world": clvol.look_at((0, 0, -3), (0, 0, 0), (0, 1, 0))}
+    to_world = clvol.look_at((0, 0, -3), (0, 0, 0), (0, 1, 0)) @ clvol.scale((0.6, 0.6, 1.0))
+    sensor = {"type": "orthographic", "to_world": to_world}
     return clvol.load_dict(
         {
             "type": "scene",

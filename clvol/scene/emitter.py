@@ -67,7 +67,9 @@ def envmap(reader: Reader) -> EnvmapEmitter:
         reader.fail(
             f"an envmap has at least 2 x 3 pixels, got {radiance.shape[1]} x {radiance.shape[0]}", place
         )
-    if fault := check_radiance(radiance, np.float32(reader.number("scale", 1.0, minimum=0.0))):
+    with np.errstate(over="ignore"):
+        scale = np.float32(reader.number("scale", 1.0, minimum=0.0))
+    if fault := check_radiance(radiance, scale):
         reader.fail(fault, place, f"at most {BRIGHTEST:g}")
     to_world = reader.transform()
     if not keeps_angles(to_world):
@@ -77,10 +79,12 @@ def envmap(reader: Reader) -> EnvmapEmitter:
 
 def check_radiance(radiance: np.ndarray, scale: np.float32) -> str:
     """Multiply a picture by `scale` and take slightly negative values as 0, in place; else what is wrong."""
-    largest = radiance.max() * scale
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is told below
+        largest = radiance.max() * scale
     for rows in bands(*radiance.shape[:2]):
         band = radiance[rows]
-        band *= scale
+        with np.errstate(over="ignore", invalid="ignore"):
+            band *= scale
         broken = ~np.isfinite(band) | (band < -NEGLIGIBLE * largest) | (band > BRIGHTEST)
         if broken.any():
             row, column = np.argwhere(broken)[0][:2]

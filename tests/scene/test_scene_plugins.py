@@ -4,6 +4,7 @@ Numbers called Mitsuba's were printed by version 3.9.1 (scalar_rgb).
 """
 
 import os
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -560,6 +561,15 @@ def test_other_integrator_parameters_are_unknown():
     assert "unknown parameter 'majorant_scale'" in error_of(
         integrator={"type": "volpath", "majorant_scale": 2.0}
     )
+
+
+def test_an_envmap_beyond_single_precision_is_one_clear_error():
+    """Also times 0, which makes no number of it."""
+    for value, factor in ((1e30, 1e300), (np.inf, 0.0)):
+        sky = np.full((3, 4, 3), value, np.float32)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            assert "radiance must be finite" in error_of(e={"type": "envmap", "bitmap": sky, "scale": factor})
 
 
 def test_rounding_below_zero_in_an_envmap_becomes_zero():
