@@ -33,7 +33,6 @@ from recipes import RECIPES
 
 from clvol import load_result
 from clvol.cli.messages import OneLineErrors
-from clvol.device.device import open_device
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -266,10 +265,10 @@ def transitions(output: Path) -> None:
 @main.command()
 @click.option(
     "--figures",
-    required=True,
+    default=hard_cases.FIGURES,
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
-    help="Keeps what is measured; what it has already is not measured again.",
+    help="Keeps what is measured, docs/hard-cases.jsonl by default; what it has is not measured again.",
 )
 @click.option(
     "--group", "groups", multiple=True, type=click.Choice(list(hard_cases.GROUPS)), help="Only these cases."
@@ -281,7 +280,7 @@ def hard(figures: Path, groups: tuple[str, ...], output: Path) -> int:
     The exit status is 1 where a case was wrong in any way.
     """
     found = hard_cases.measured(hard_cases.chosen(groups), figures)
-    write(output, hard_cases.page(found, open_device(None).description))
+    write(output, hard_cases.page(found))
     return 1 if any(one.wrong for one in found.values()) else 0
 
 

@@ -1,6 +1,7 @@
 """Renders the hard cases in every way, and writes the page of what they show.
 
-A file keeps the figures of each case as soon as they are there, so that hours of them may be had in parts.
+docs/hard-cases.jsonl keeps the figures of each case, one a line, as soon as they are there, so that hours of
+them may be had in parts.  To render a case anew, delete its line.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import math
 from typing import TYPE_CHECKING
 
 import click
+from folders import ROOT
 
 from clvol.device.device import open_device
 from clvol.lab.hard.case import NOISY, ROUNDING
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 
     from clvol.lab.hard.case import Case
 
+FIGURES = ROOT / "docs" / "hard-cases.jsonl"
 SEED = 2
 INTRODUCTION = """\
 # Hard cases
@@ -30,7 +33,8 @@ INTRODUCTION = """\
 Scenes on which renderers give NaN, black pixels, leaks or a wrong number. Each is described once, in
 `clvol/lab/hard/`, with the number that its picture must show. `python tools/docs.py hard` renders it by every
 technique, transmittance and majorant that the scene tells apart, samplers by turns, and holds the mean of
-each picture to that number ({device}).
+each picture to that number. `docs/hard-cases.jsonl` keeps the figures, and on which device each was rendered:
+{device}.
 
 - **expected**: by closed form, or by float64 quadrature with code that shares nothing with the kernels
   (`clvol/lab/hard/block.py`, `clvol/lab/hard/scenes.py`).
@@ -56,7 +60,8 @@ def measured(cases: Sequence[Case], figures: Path) -> dict[str, Summary]:
         if case.name in found:
             continue
         with quiet_renders():
-            found[case.name] = Summary.of(list(run(device, [case], every_way, SEED)), ALPHA)
+            seen = list(run(device, [case], every_way, SEED))
+        found[case.name] = Summary.of(seen, ALPHA, device.description)
         with figures.open("a", encoding="utf-8") as file:
             file.write(json.dumps(found[case.name].as_dict()) + "\n")
         click.echo(row(case, found[case.name]))
@@ -72,9 +77,10 @@ def read(figures: Path) -> dict[str, Summary]:
     }
 
 
-def page(found: dict[str, Summary], described: str) -> str:
+def page(found: dict[str, Summary]) -> str:
     """docs/hard-cases.md."""
-    lines = [INTRODUCTION.format(device=described, rounding=ROUNDING, noisy=NOISY, alarm=round(1 / ALPHA))]
+    devices = "; ".join(dict.fromkeys(summary.device for summary in found.values()))
+    lines = [INTRODUCTION.format(device=devices, rounding=ROUNDING, noisy=NOISY, alarm=round(1 / ALPHA))]
     for group, cases in GROUPS.items():
         have = [case for case in cases if case.name in found]
         if not have:

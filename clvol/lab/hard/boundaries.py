@@ -104,7 +104,7 @@ ONE_MEDIUM = "Mitsuba keeps one medium where several overlap"
 CASES = (
     *(_sky(f"volumes {name}", lambda b=blocks: b, note=ONE_MEDIUM) for name, blocks in PAIRS.items()),  # type: ignore[misc]
     *(_sun(f"volumes {name}", lambda b=blocks: b) for name, blocks in PAIRS.items()),  # type: ignore[misc]
-    _sky(f"{DEEP} media in one another", lambda: _added(DEEP, DENSE), spp=32),
+    _sky(f"{DEEP} media in one another", lambda: _added(DEEP, DENSE), spp=512),
     _sky("64 volumes in one another", lambda: _added(64, np.ones((3, 3, 3))), spp=64),
     Case(
         f"before a sky: {DEEP} media, each the exterior of the next",
@@ -112,7 +112,7 @@ CASES = (
         lambda: _replaced()[0],
         lambda: scenes.transmitted(_replaced()[1], EYE, AHEAD),
         "closed form: the lengths in each medium",
-        32,
+        2048,
     ),
     Case(
         "before a sky: a mesh with triangles there twice, turned and without area",
@@ -120,7 +120,6 @@ CASES = (
         lambda: _spoilt(scenes.through([LUMPY], EYE, AHEAD)),
         lambda: scenes.transmitted([LUMPY], EYE, AHEAD),
         "float64 quadrature of the optical depth",
-        note="triangles that are there twice make other renderers enter or leave twice",
     ),
     Case(
         "in the sun: a mesh with triangles there twice, turned and without area",

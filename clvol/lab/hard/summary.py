@@ -23,8 +23,8 @@ class Summary:
     right, noisy, wrong : renders by verdict.
     expected, mean, error : by channel, one number where all are the same; mean and standard error of all that
         were not too noisy.
-    p : the smallest p-value, adjusted for the number of renders.
     accused : what was wrong, by the choices in force.
+    device : that rendered it.
     """
 
     case: str
@@ -34,11 +34,11 @@ class Summary:
     expected: tuple[float, ...]
     mean: tuple[float, ...]
     error: tuple[float, ...]
-    p: float
-    accused: tuple[str, ...]
+    accused: tuple[str, ...] = ()
+    device: str = ""
 
     @classmethod
-    def of(cls, seen: Sequence[Seen], alpha: float) -> Summary:
+    def of(cls, seen: Sequence[Seen], alpha: float, device: str) -> Summary:
         """`alpha`: false-alarm rate of all these renders together."""
         level = alpha / len(seen)
         words = [one.word(level) for one in seen]
@@ -55,11 +55,11 @@ class Summary:
             _channels(expected, expected),
             _channels(mean, expected),
             _channels(error, expected),
-            min(1.0, len(seen) * min(one.p for one in seen)),
             tuple(
                 f"{one.names['technique']}, {one.names['transmittance']}, {one.names['majorant']}"
                 for one in accused
             ),
+            device,
         )
 
     def as_dict(self) -> dict[str, Any]:
