@@ -1,4 +1,4 @@
-"""docs/hard-cases.md is that of docs/hard-cases.jsonl, which has figures of every case and calls none wrong."""
+"""The page of hard cases is made of docs/hard-cases.jsonl, which has figures of every case, none wrong."""
 
 from __future__ import annotations
 
