@@ -105,6 +105,7 @@ CASES = {
     "flames": Case("flames", {}, {"majorant": "grid", "probability": "average"}, uninitialised=False),
     "within": Case("within", {}),
     "a meter": Case("a meter", {}),
+    "a target": Case("a target", {}),
     "far apart": Case("far apart", {}, {"technique": "delta", "majorant": "grid"}),
     "far apart, tree": Case("far apart", {}, {"technique": "spectral", "majorant": "kdtree"}),
     "a backdrop": Case("a backdrop", {}, {"technique": "delta", "background": "sampled", "majorant": "grid"}),

@@ -225,6 +225,17 @@ def plate() -> clvol.Scene:
     )
 
 
+def target() -> clvol.Scene:
+    """A ball in fog, seen all over from afar."""
+    ball = {"type": "sphere", "radius": 0.2}
+    pixel = {"type": "hdrfilm", "width": 1, "height": 1}
+    sensor = {"type": "distant", "direction": (0.2, 0.1, 1.0), "target": ball, "film": pixel}
+    fog = {"type": "homogeneous", "sigma_t": 0.5, "albedo": 0.8}
+    integrator = {"type": "volpath", "max_depth": 3}
+    described = {"type": "scene", "integrator": integrator, "sensor": sensor, "sky": {"type": "constant"}}
+    return clvol.load_dict(described | {"fog": box(fog), "ball": ball})
+
+
 def far_apart() -> clvol.Scene:
     """A sparse grid of which two distant corners hold something."""
     leaf = np.full((8, 8, 8), 0.2), np.ones((8, 8, 8), bool)
@@ -247,6 +258,7 @@ MADE = {
     "flakes": flakes,
     "within": within,
     "a meter": plate,
+    "a target": target,
     "far apart": far_apart,
     "a backdrop": lambda: one_medium(backdrop=0.3),
     "transparent": lambda: one_medium(pixel_format="rgba"),

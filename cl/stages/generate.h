@@ -17,7 +17,7 @@ INLINE void write_result(const Scene *scene, uint slot, uint job)
 {
     const uint ring_jobs = scene->render->pass_jobs * scene->render->ring_passes;
     const uint place = job % ring_jobs;
-#if CLVOL_HAS_METER
+#if CLVOL_HAS_METER && !CLVOL_HAS_TARGET
     const Spectrum radiance = PI * path_sample_weight(scene, slot) * path_radiance(scene, slot); /* an irradiance */
 #else
     const Spectrum radiance = path_sample_weight(scene, slot) * path_radiance(scene, slot);

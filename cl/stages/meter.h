@@ -1,5 +1,6 @@
-/* Rays of an irradiancemeter: from points that lie evenly on its shape, along directions in proportion to their cosine
-   with the normal there, so that pi times the mean of what they bring is the irradiance. */
+/* Rays of meters that measure all over a shape, from points that lie evenly on it.  Of an irradiancemeter they go along
+   directions in proportion to their cosine with the normal there, so that pi times the mean of what they bring is the
+   irradiance.  A distant sensor's come to these points from afar. */
 #ifndef CLVOL_STAGES_METER_H
 #define CLVOL_STAGES_METER_H
 #if CLVOL_HAS_METER
@@ -46,13 +47,19 @@ INLINE float3 meter_point(const Scene *scene, float x, float y, float3 *n)
     return p + *n * ((size + 1e-30f) * 0x1p-20f);
 }
 
-/* A path starts on the shape; x, y and u, v are uniform. */
+/* A path starts on the shape, or on its way there; x, y and u, v are uniform. */
 INLINE void set_meter_ray(const Scene *scene, uint slot, float x, float y, float u, float v)
 {
     float3 n;
-    set_path_origin(scene, slot, meter_point(scene, min_of(x, 0x1.fffffep-1f), y, &n));
+    const float3 p = meter_point(scene, min_of(x, 0x1.fffffep-1f), y, &n);
+#if CLVOL_HAS_TARGET
+    set_path_origin(scene, slot, p + load_vector(scene->render->lens_x));
+    set_path_direction(scene, slot, load_vector(scene->render->camera_base));
+#else
+    set_path_origin(scene, slot, p);
     const float2 across = sqrt_of(u) * cos_sin_turn(v);
     set_path_direction(scene, slot, to_frame(n, across.x, across.y, sqrt_of(1.0f - u)));
+#endif
 }
 #endif
 

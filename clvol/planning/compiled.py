@@ -97,6 +97,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_HAS_LENS": int(f.lens),
         "CLVOL_HAS_PARALLEL_RAYS": int(f.parallel_rays),
         "CLVOL_HAS_METER": int(f.meter),
+        "CLVOL_HAS_TARGET": int(f.meter and f.parallel_rays),
         "CLVOL_HAS_LONG_WALKS": int(f.heterogeneous or f.passable),
         "CLVOL_WALKS_GRID": int(plan.walks_majorants and plan.chosen["majorant"] == "grid"),
         "CLVOL_WALKS_TREE_GRID": int(plan.walks_majorants and plan.has_tree_grid),

@@ -68,7 +68,7 @@ def find_features(scene: records.Scene, found: Boundaries) -> Features:
         signed_filter=scene.film.rfilter.signed,
         lens=_has_lens(scene.camera),
         parallel_rays=isinstance(scene.camera, records.Orthographic | records.Meter),
-        meter=isinstance(scene.camera, records.IrradianceMeter),
+        meter=records.measured_shape(scene.camera) is not None,
         depth_limited=scene.integrator.max_depth >= 0,
         hide_emitters=scene.integrator.hide_emitters,
         hide_environment=scene.integrator.hide_emitters or scene.film.backdrop is not None,

@@ -52,8 +52,8 @@ def upload_scene(
         arrays["sobol"] = block_table(bool(prepared.plan.macros["CLVOL_JOINT"]))
     if "filter_cdf" in needed:
         arrays["filter_cdf"] = filter_cdf(prepared.scene.film.rfilter)
-    if isinstance(prepared.scene.camera, records.IrradianceMeter):
-        arrays["meter"] = meter_faces(prepared.scene.camera.shape, prepared.centre)
+    if (measured := records.measured_shape(prepared.scene.camera)) is not None:
+        arrays["meter"] = meter_faces(measured, prepared.centre)
     buffers |= {name: there.put(name, array) for name, array in arrays.items()}
     if "light_cache" in needed:
         camera = device.memory.upload(render, "the camera")

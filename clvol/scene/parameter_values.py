@@ -17,10 +17,9 @@ from clvol.scene.image import image_from_array
 from clvol.scene.medium_facts import channels_of
 from clvol.scene.reader import BRIGHTEST, ROUNDING, range_in_words
 from clvol.scene.sensor import film_fault, is_rigid
-from clvol.scene.shape import stays_round
 from clvol.scene.tabulated import table_fault
 from clvol.scene.texture import check_texels
-from clvol.scene.transforms import as_matrix, check_size, keeps_angles, scale, translate
+from clvol.scene.transforms import as_matrix, check_size, keeps_angles, scale, stays_round, translate
 from clvol.scene.volume import largest_value
 from clvol.volumes import check_coefficients, check_finite, dense_from_array
 from clvol.volumes.grid import DenseGrid

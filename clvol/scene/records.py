@@ -96,7 +96,7 @@ class Meter:
     """Rays along local +z of a rigid `to_world`, whose mean is a picture of one pixel.
 
     They start at its origin, or if `distant` outside of all there is: on their way to the `target`, which is
-    a point (float64 (3,)), any place on a rectangle or disk, or without one on a section of the scene.
+    a point (float64 (3,)), any place on a shape, or without one on a section of the scene.
     `medium`: as of the others.
     """
 
@@ -120,6 +120,14 @@ class IrradianceMeter:
     def to_world(self) -> np.ndarray:
         """That of the shape."""
         return self.shape.to_world
+
+
+def measured_shape(camera: Camera) -> Shape | None:
+    """The shape from all over which a meter draws points, where it has one that is no rectangle or disk."""
+    if isinstance(camera, IrradianceMeter):
+        return camera.shape
+    target = camera.target if isinstance(camera, Meter) else None
+    return target if isinstance(target, Shape) and target.kind not in ("rectangle", "disk") else None
 
 
 Camera = Perspective | Orthographic | Meter | IrradianceMeter

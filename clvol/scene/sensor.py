@@ -23,7 +23,7 @@ from clvol.scene.records import (
     Shape,
     ShapeMeter,
 )
-from clvol.scene.transforms import frame, translate
+from clvol.scene.transforms import frame, stays_round, translate
 
 if TYPE_CHECKING:
     from clvol.scene.reader import Reader
@@ -95,9 +95,13 @@ def distant(reader: Reader) -> Sensor:
     shapes = reader.children("shape", "target")
     if shapes:
         target = reader.build(shapes[0][1])
-        if not isinstance(target, Shape) or target.kind not in ("rectangle", "disk"):
+        if not isinstance(target, Shape):
             kind = shapes[0][1].type
-            reader.unsupported(f"a {kind} as the target of a distant sensor", "target", "take a rectangle")
+            reader.unsupported(
+                f"a {kind} as the target of a distant sensor", "target", "take one shape of it"
+            )
+        if target.kind == "cylinder" and not stays_round(target.to_world):
+            reader.fail("a cylinder that is a target must not be stretched across or sheared", "target")
     elif reader.has("target"):
         target = reader.vector("target", (0.0, 0.0, 0.0))
     if reader.only_child("medium"):

@@ -19,7 +19,7 @@ from clvol.scene.mesh_attributes import with_attributes
 from clvol.scene.mesh_files import read_mesh
 from clvol.scene.nodes import NAMELESS
 from clvol.scene.records import Medium, Mesh, Shape, ShapeMeter
-from clvol.scene.transforms import check_size, frame, keeps_angles, scale, translate
+from clvol.scene.transforms import check_size, frame, keeps_angles, scale, stays_round, translate
 
 if TYPE_CHECKING:
     from clvol.scene.materials import Bsdf, Texture
@@ -78,12 +78,6 @@ def cylinder(reader: Reader) -> Shape:
             "scale x and y alike in the cylinder's own frame",
         )
     return shape
-
-
-def stays_round(matrix: np.ndarray) -> bool:
-    """Whether a 4x4 transform keeps circles round z circles, and z across them."""
-    gram = matrix[:3, :3].T @ matrix[:3, :3]
-    return bool(np.allclose(gram, np.diag(np.diag(gram)[[0, 0, 2]]), atol=1e-4 * gram.max()))
 
 
 def mesh(reader: Reader) -> Shape:

@@ -223,6 +223,12 @@ def _number(value: float, what: str) -> float:
     return number
 
 
+def stays_round(matrix: np.ndarray) -> bool:
+    """Whether a 4x4 transform keeps circles round z circles, and z across them."""
+    gram = matrix[:3, :3].T @ matrix[:3, :3]
+    return bool(np.allclose(gram, np.diag(np.diag(gram)[[0, 0, 2]]), atol=1e-4 * gram.max()))
+
+
 def keeps_angles(matrix: np.ndarray) -> bool:
     """Whether a 4x4 transform rotates, mirrors and scales all axes alike, and nothing else."""
     gram = matrix[:3, :3].T @ matrix[:3, :3]

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.layout import enum
-from clvol.scene.records import IrradianceMeter, Meter, Orthographic, Shape
+from clvol.scene.records import IrradianceMeter, Meter, Orthographic, Shape, measured_shape
 from clvol.scene.sensor import field_of_view_x
 from clvol.tables.meters import meter_faces
 
@@ -96,6 +96,9 @@ def _meter_rays(sensor: Meter, centre: np.ndarray, radius: float) -> CameraRays:
     dx = dy = lens_x = lens_y = nothing
     if not sensor.distant:
         position = eye + max(0.0, float(-eye @ forward) - radius) * forward
+    elif (shape := measured_shape(sensor)) is not None:
+        eye = position = meter_faces(shape, centre)[0]["place"] - 2 * radius * forward
+        lens_x = -2 * radius * forward  # from there; places are drawn on the device
     elif isinstance(sensor.target, Shape):
         middle, (x, y) = sensor.target.to_world[:3, 3] - centre, sensor.target.to_world[:3, :2].T
         eye = position = middle - 2 * radius * forward

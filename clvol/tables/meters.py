@@ -1,4 +1,4 @@
-"""The shape of an irradiancemeter as the device draws points of it."""
+"""The shape that a meter measures all over, as the device draws points of it."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def meter_faces(shape: Shape, centre: np.ndarray) -> np.ndarray:
     areas = np.linalg.norm(normals, axis=1)
     some = areas > 0
     if not some.any():
-        raise SceneError("an irradiancemeter is on a shape without any area", shape.name or shape.kind)
+        raise SceneError("a meter is on a shape without any area", shape.name or shape.kind)
     faces = np.zeros(int(some.sum()), layout.METER_FACE)
     faces["kind"], faces["count"] = layout.enum("METER", "triangle"), len(faces)
     faces["cdf"] = np.cumsum(areas[some]) / areas[some].sum()

@@ -63,6 +63,60 @@ def test_a_target_is_seen_and_nothing_else(measured, target, expected):
     assert mean == pytest.approx(expected, abs=max(4 * error, 1e-6))
 
 
+CUBE = {"type": "cube", "to_world": clvol.translate([2.7, 0.2, 1]) @ clvol.scale([0.3, 0.6, 0.2])}
+CORNERS = np.array([(0, 0, 0), (2, 0, 0), (0, 1, 0), (0, 0, 3)], float)
+SOLIDS = {
+    "sphere": {"type": "sphere", "center": [3.1, 0, 1.0], "radius": 0.6},
+    "cube": CUBE,
+    "cylinder": {"type": "cylinder", "p0": [2.9, 0, 0.3], "p1": [2.6, 0.3, 1.5], "radius": 0.4},
+    "mesh": {
+        "type": "mesh",
+        "vertex_positions": np.add(CORNERS, (2, 0, 0.5)),
+        "faces": np.array([(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]),
+    },
+}
+
+
+def points_of(name, n=400_000):
+    """Points that lie evenly on a solid, float64 (n, 3)."""
+    random = np.random.default_rng(5)
+    given, (u, v) = SOLIDS[name], random.random((2, n))
+    turn = np.stack([np.cos(2 * np.pi * v), np.sin(2 * np.pi * v)], -1)
+    if name == "sphere":
+        z = 2 * u - 1
+        return given["center"] + given["radius"] * np.c_[np.sqrt(1 - z * z)[:, None] * turn, z]
+    if name == "cylinder":
+        axis = np.subtract(given["p1"], given["p0"])
+        across = np.cross(axis, (1, 0, 0)) / np.linalg.norm(np.cross(axis, (1, 0, 0)))
+        other = np.cross(axis, across) / np.linalg.norm(axis)
+        return given["p0"] + u[:, None] * axis + given["radius"] * turn @ np.array([across, other])
+    if name == "mesh":
+        corners = given["vertex_positions"][given["faces"]]
+        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        a, b, c = np.moveaxis(corners[random.choice(4, n, p=areas / areas.sum())], 1, 0)
+        root = np.sqrt(u)[:, None]
+        return a + root * (1 - v[:, None]) * (b - a) + root * v[:, None] * (c - a)
+    half = np.array([0.3, 0.6, 0.2])
+    area = np.array([half[1] * half[2], half[0] * half[2], half[0] * half[1]])
+    axis = random.choice(3, n, p=area / area.sum())
+    local = random.uniform(-1, 1, (n, 3))
+    local[np.arange(n), axis] = np.where(random.random(n) < 0.5, -1.0, 1.0)
+    return np.array([2.7, 0.2, 1]) + local * half
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_a_solid_is_seen_all_over(measured, name):
+    """The share of its points from which the way leads on, or came, through the floor."""
+    p = points_of(name)
+    x, y = (p[:, k] - p[:, 2] * STEEP[k] / STEEP[2] for k in range(2))
+    inside = (np.abs(x) < 3) & (np.abs(y) < 3)
+    expected, spread = inside.mean(), inside.std() / np.sqrt(len(p))
+    mean, error = measured(scene_of(distant(target=SOLIDS[name])))
+    assert 0.1 < expected < 0.9
+    assert mean == pytest.approx(expected, abs=4 * np.hypot(error, spread))
+    assert error < 0.005
+
+
 def test_a_radiancemeter_sees_along_one_ray(measured):
     meter = {"type": "radiancemeter", "origin": [2.9, 0, 5], "direction": [0, 0, -2]}
     assert measured(scene_of(meter)) == (1.0, 0.0)
@@ -113,7 +167,14 @@ def test_they_are_described_and_have_parameters():
         ),
         (distant(to_world=np.eye(4)), "either direction or to_world, not both"),
         (distant(direction=[0, 0, 0]), "direction is zero"),
-        (distant(target={"type": "sphere"}), "a sphere as the target of a distant sensor"),
+        (
+            distant(target={"type": "merge", "a": {"type": "cube"}}),
+            "a merge as the target of a distant sensor",
+        ),
+        (
+            distant(target={"type": "cylinder", "to_world": clvol.scale([1, 2, 1])}),
+            "must not be stretched across",
+        ),
         (distant(target="floor"), "'target' of sensor 'distant' must be three finite numbers"),
         (distant(fog={"type": "homogeneous"}), "starts outside of all shapes, and takes no medium"),
         ({"type": "radiancemeter", "to_world": clvol.scale(2)}, "must not scale or shear"),

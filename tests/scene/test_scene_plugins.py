@@ -434,7 +434,10 @@ def test_a_spheres_center_and_radius_apply_before_to_world():
         ({"type": "cube", "a": {"type": "area"}, "b": {"type": "area"}}, "takes one emitter, got 2"),
         ({"type": "cube", "light": {"type": "area", "to_world": scale(2)}}, "unknown parameter 'to_world'"),
         ({"type": "cube", "light": {"type": "area", "radiance": -1.0}}, "must be in [0, 1e+15]"),
-        ({"type": "cube", "eye": {"type": "perspective"}}, "shape 'cube' takes no sensor ('perspective')"),
+        (
+            {"type": "cube", "eye": {"type": "perspective"}},
+            "a shape takes no sensor 'perspective'; irradiancemeters go into shapes",
+        ),
         ({"type": "cube", "a": {"type": "null"}, "b": {"type": "null"}}, "takes one bsdf, got 2"),
         ({"type": "cube", "flip_normals": 1}, "must be true or false"),
         ({"type": "disk", "face_normals": True}, "unknown parameter 'face_normals'"),  # as in Mitsuba
