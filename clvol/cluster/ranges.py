@@ -14,8 +14,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 LEAST_RANGES = 64
-"""A picture has at least so many ranges, if it has as many samples of a pixel."""
+"""A picture has at least so many ranges, if it has as many samples of a pixel, and enough over all pixels."""
 MOST_RANGES = 1 << 14
+LEAST_PATHS = 1 << 20
+"""A range has at least so many samples over all pixels: each costs as much as some 35,000 beside."""
 RANGE_PATHS = 1 << 24
 """A range has about so many samples over all pixels: some ten seconds of a processor, one of a large GPU."""
 
@@ -27,7 +29,8 @@ def range_length(count: int, pixels: int) -> int:
     usual = max(1, RANGE_PATHS // pixels)
     if count >= MAX_SAMPLES // 2:  # without an end
         return usual
-    return max(-(-count // MOST_RANGES), min(-(-count // LEAST_RANGES), usual))
+    least = min(max(-(-LEAST_PATHS // pixels), -(-count // LEAST_RANGES)), count)
+    return max(-(-count // MOST_RANGES), min(least, usual))
 
 
 def sample_ranges(first: int, count: int, pixels: int) -> Iterator[tuple[int, int]]:

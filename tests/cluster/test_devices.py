@@ -20,7 +20,7 @@ sys.path[:0] = {path!r}
 from every_bit import digest, scene
 import clvol
 from clvol.cluster import ranges
-ranges.LEAST_RANGES = 16
+ranges.LEAST_RANGES, ranges.LEAST_PATHS = 16, 1
 print(len(clvol.devices()))
 for device in ("all", ["pthread"], ["basic"], ["pthread", 0]):
     result = clvol.render(scene(), spp=68, seed=3, sampler="joint", device=device)

@@ -5,7 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from clvol.cluster.ranges import LEAST_RANGES, MOST_RANGES, RANGE_PATHS, Tree, range_length, sample_ranges
+from clvol.cluster.ranges import (
+    LEAST_PATHS,
+    LEAST_RANGES,
+    MOST_RANGES,
+    RANGE_PATHS,
+    Tree,
+    range_length,
+    sample_ranges,
+)
 from clvol.cluster.survey import Need
 from clvol.picture.estimate import Moments
 from clvol.picture.parts import FAN_IN, Part, added, sum_of
@@ -29,6 +37,14 @@ def test_ranges_cover_the_samples_and_are_neither_few_nor_many(count, pixels):
         assert sum(size for _, size in found) == count
         assert min(count, LEAST_RANGES) // 2 <= ranges <= MOST_RANGES
     assert length == 1 or length * pixels <= max(RANGE_PATHS, pixels * -(-count // MOST_RANGES))
+
+
+def test_a_range_is_worth_what_it_costs(monkeypatch):
+    monkeypatch.setattr("clvol.cluster.ranges.LEAST_PATHS", LEAST_PATHS)
+    for pixels, count in ((128 * 128, 1024), (100, 10**5), (1920 * 1080, 64), (10**8, 3)):
+        length = range_length(count, pixels)
+        assert LEAST_PATHS <= length * pixels < LEAST_PATHS + pixels or length == 1
+    assert range_length(10, 100) == 10, "a small picture is one"
 
 
 @pytest.mark.parametrize("count", [1, 2, FAN_IN, FAN_IN + 1, 3 * FAN_IN**2 + 5 * FAN_IN + 3])

@@ -44,6 +44,14 @@ def described(cameras=CAMERAS, film=FILM, **more):
     }
 
 
+@pytest.fixture(scope="module", autouse=True)
+def short_ranges():
+    """Pictures of these tests are small, and cut into ranges nevertheless."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("clvol.cluster.ranges.LEAST_PATHS", 1)
+        yield
+
+
 @pytest.fixture(scope="module")
 def scene():
     return load_dict(described())
