@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 import bench
 import click
 import hard_cases
+import hard_mitsuba
 from benchmarks.options import mitsuba_option
 from benchmarks.scene_tables import overview
 from benchmarks.tables import judge
@@ -273,13 +274,18 @@ def transitions(output: Path) -> None:
 @click.option(
     "--group", "groups", multiple=True, type=click.Choice(list(hard_cases.GROUPS)), help="Only these cases."
 )
+@click.option(
+    "--mitsuba", metavar="PYTHON", help="A Python with Mitsuba 3.9 and NumPy, to render cases in it too."
+)
 @output_option(DOCS / "hard-cases.md")
-def hard(figures: Path, groups: tuple[str, ...], output: Path) -> int:
+def hard(figures: Path, groups: tuple[str, ...], mitsuba: str | None, output: Path) -> int:
     """The page of hard cases: each in every way, some hours in all.
 
     The exit status is 1 where a case was wrong in any way.
     """
     found = hard_cases.measured(hard_cases.chosen(groups), figures)
+    if mitsuba:
+        hard_mitsuba.measure(mitsuba, hard_cases.chosen(groups))
     write(output, hard_cases.page(found))
     return 1 if any(one.wrong for one in found.values()) else 0
 

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
+import hard_mitsuba
 from folders import ROOT
 
 from clvol.device.device import open_device
@@ -46,6 +47,8 @@ each picture to that number. `docs/hard-cases.jsonl` keeps the figures, and on w
   million times.
 - **wrong**: all others, and any with a sample that is not finite, a walk that was given up or a density above
   a bound that the technique needs.
+- **Mitsuba {mitsuba}**: what its `volpath` (scalar_rgb) showed of the scene with as many samples, in at most
+  {seconds} s. "right" is within chance and {slack:.1%}. – where the scene has what only clvol reads.
 
 `clvol selftest` renders these cases in one way each, with `--quick` some of them. So do `pytest -m contract`
 and `pytest`. `pytest tests/hard -m hard_full` renders them in every way.
@@ -79,15 +82,30 @@ def read(figures: Path) -> dict[str, Summary]:
 
 def page(found: dict[str, Summary]) -> str:
     """docs/hard-cases.md."""
+    theirs = hard_mitsuba.read()
+    version = max(seen["version"] for seen in theirs.values() if "version" in seen)
     devices = "; ".join(dict.fromkeys(summary.device for summary in found.values()))
-    lines = [INTRODUCTION.format(device=devices, rounding=ROUNDING, noisy=NOISY, alarm=round(1 / ALPHA))]
+    lines = [
+        INTRODUCTION.format(
+            device=devices,
+            rounding=ROUNDING,
+            noisy=NOISY,
+            alarm=round(1 / ALPHA),
+            mitsuba=version,
+            seconds=hard_mitsuba.SECONDS,
+            slack=hard_mitsuba.SLACK,
+        )
+    ]
     for group, cases in GROUPS.items():
         have = [case for case in cases if case.name in found]
         if not have:
             continue
         lines += [f"\n## {group.capitalize()}\n"]
-        lines += ["| case | expected | seen | right | too noisy | wrong |", "|---|---|---|---|---|---|"]
-        lines += [row(case, found[case.name]) for case in have]
+        lines += [
+            f"| case | expected | seen | right | too noisy | wrong | Mitsuba {version} |",
+            "|---|---|---|---|---|---|---|",
+        ]
+        lines += [f"{row(case, found[case.name])} {beside(theirs.get(case.name))} |" for case in have]
         sources = dict.fromkeys(case.source for case in have)
         lines += ["", f"Expected by {'; '.join(sources)}."]
         notes = dict.fromkeys(case.note for case in have if case.note)
@@ -102,6 +120,16 @@ def row(case: Case, found: Summary) -> str:
     return (
         f"| {case.name} | {expected} | {seen} | {found.right} | {found.noisy or '–'} | {found.wrong or '–'} |"
     )
+
+
+def beside(seen: dict[str, Any] | None) -> str:
+    """What Mitsuba showed, in a cell of the table: a word where it is right."""
+    if seen is None:
+        return "–"
+    if seen["word"] not in ("wrong", "black"):
+        return str(seen["word"])
+    numbers = ", ".join(said(m, e) for m, e in zip(seen["mean"], seen["error"], strict=True))
+    return f"**{seen['word']}**: {numbers}"
 
 
 def said(mean: float, error: float) -> str:
