@@ -15,6 +15,7 @@ from clvol.layout import PRINCIPLED_NUMBERS
 from clvol.scene import materials, records
 from clvol.scene import parameter_values as values
 from clvol.scene.medium_facts import channels_of
+from clvol.scene.phase import MOST_PEAKED
 from clvol.scene.sensor import field_of_view_x
 from clvol.volumes.grid import DenseGrid
 from clvol.volumes.transfer import Transfer
@@ -234,7 +235,7 @@ def _phase(medium: Any, phase: records.PhaseFunction, put: Put, path: tuple[str,
             parts = _phase(medium, getattr(phase, side), put_side, (*path, side))
             yield from _nested(f"phase_{number}", parts)
     elif phase.kind == "hg":
-        check = values.number(-1, 1, exclusive=True)
+        check = values.number(-MOST_PEAKED, MOST_PEAKED)
         yield "g", Parameter(medium, phase.g, check, lambda m, v: inner(m, g=v))
     elif phase.table is not None:
         check = values.phase_values(phase.table)

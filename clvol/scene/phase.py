@@ -25,9 +25,19 @@ def isotropic(reader: Reader) -> Phase:
     return Phase()
 
 
+MOST_PEAKED = 0.999997
+"""Largest |g|: single precision rounds it by up to 3e-8, a hundredth of what is left to 1."""
+
+
 def hg(reader: Reader) -> Phase:
-    """The Henyey-Greenstein phase function of mean cosine `g`, -1 < g < 1."""
-    return Phase("hg", reader.number("g", 0.8, minimum=-1.0, maximum=1.0, open_interval=True))
+    """The Henyey-Greenstein phase function of mean cosine `g`, -1 < g < 1.
+
+    Its peak is as high as 1 - |g| is small, of which single precision leaves nothing in the end.
+    """
+    g = reader.number("g", 0.8, minimum=-1.0, maximum=1.0, open_interval=True)
+    if abs(g) > MOST_PEAKED:
+        reader.fail(f"'g' of phase 'hg' must be at most {MOST_PEAKED} from 0, got {g!r}", "g")
+    return Phase("hg", g)
 
 
 def rayleigh(reader: Reader) -> Phase:

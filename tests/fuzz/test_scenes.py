@@ -8,7 +8,7 @@ import os
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from plugin_parameters import CELLS, PARAMETERS, RGB, TEXTURE, Silent
 
@@ -123,6 +123,7 @@ def scenes(draw):
     suppress_health_check=list(HealthCheck),
 )
 @given(scenes())
+@example({"type": "scene", "sensor": {"type": "batch", "a": {"type": "batch", "b": {"type": "perspective"}}}})
 def test_any_dict_is_a_scene_or_an_error(described):
     try:
         scene = clvol.load_dict(described)

@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 from stat_tests import sidak
 
+import clvol
 from clvol.lab.combinations import unbiased
+from clvol.lab.hard import scenes, thickness
 from clvol.lab.hard.case import CROSSED, NOISY, SAMPLER, loaded, ways
 from clvol.lab.hard.suite import ALPHA, CASES, TURNS, every_way, run, turn
 
@@ -74,6 +76,15 @@ def test_turns_and_the_product_have_every_choice():
         assert {way[family] for way in product} >= set(unbiased(family)) - {"none"}
     assert {way["sampler"] for way in product} == set(unbiased("sampler")) == set(SAMPLER.values())
     assert [tuple(turn(QUICK[0], n)[family] for family in CROSSED) for n in range(len(TURNS))] == list(TURNS)
+
+
+@pytest.mark.parametrize("g", [1.0, -1.0, 0.99999999999, -0.999998, float("nan")])
+def test_a_peak_that_single_precision_does_not_tell_is_refused(g):
+    """One that it takes for 1 had no light from any sun, and no word."""
+    block, phase = thickness.block(1.0), {"type": "hg", "g": g}
+    scene = scenes.furnace([block], thickness.EYE, thickness.AHEAD, phase=phase)
+    with pytest.raises(clvol.Error, match="'g' of phase 'hg' must be"):
+        clvol.load_dict(scene)
 
 
 def test_analog_techniques_refuse_bounds_that_do_not_hold():
