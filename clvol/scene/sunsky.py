@@ -13,8 +13,8 @@ import numpy as np
 
 from clvol.base.rows import bands
 from clvol.scene.emitter import accept_common
+from clvol.scene.lights import ConstantEmitter, Emitter, EnvmapEmitter, SunEmitter
 from clvol.scene.reader import BRIGHTEST
-from clvol.scene.records import ConstantEmitter, Emitter, EnvmapEmitter, SunEmitter
 from clvol.scene.sky_model import TURBIDITIES, Sky, sun_irradiance
 from clvol.scene.sun_position import Place, sun_direction
 from clvol.scene.transforms import keeps_angles

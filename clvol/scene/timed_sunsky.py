@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from clvol.scene import sunsky
-from clvol.scene.records import ConstantEmitter, Emitter, EnvmapEmitter
+from clvol.scene.lights import ConstantEmitter, Emitter, EnvmapEmitter
 from clvol.scene.sky_model import Sky, sun_irradiance
 from clvol.scene.sun_position import Place, sun_direction
 from clvol.scene.sunsky import FROM_MAP, HEIGHT, WIDTH, Air, map_directions
