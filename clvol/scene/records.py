@@ -21,6 +21,7 @@ from clvol.scene.films import Sampler as Sampler
 from clvol.scene.kept import Kept
 from clvol.scene.lights import ConstantEmitter as ConstantEmitter
 from clvol.scene.lights import DirectionalEmitter as DirectionalEmitter
+from clvol.scene.lights import Emitter as Emitter  # noqa: TC001 - others import it from here
 from clvol.scene.lights import EnvmapEmitter as EnvmapEmitter
 from clvol.scene.lights import PointEmitter as PointEmitter
 from clvol.scene.lights import ProjectorEmitter as ProjectorEmitter
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from clvol.scene.lights import Emitter as Emitter
     from clvol.volumes.transfer import Transfer, Transfers
 
 Spectrum = tuple[float, ...]
