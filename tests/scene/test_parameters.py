@@ -217,7 +217,7 @@ MISTAKES = [
     ("sky.radiance.value", "red", "a number or a colour of three"),
     ("smoke.interior.scale", float("nan"), "a number or a colour of three"),
     ("smoke.interior.albedo", 1.5, "in .0, 1."),
-    ("smoke.interior.phase.g", 1, "in .-1, 1."),
+    ("smoke.interior.phase.g", 1, "in .-0.999997, 0.999997."),
     ("smoke.interior.sigma_t.data", -VALUES, "120 negative"),
     ("smoke.interior.sigma_t.data", VALUES[0], "array of 2 axes"),
     ("smoke.interior.sigma_t.data", np.ones((2, 2, 2, 3)), "must have 1 channel as before"),
