@@ -122,7 +122,7 @@ def test_no_message_of_the_library_is_in_one_language_alone() -> None:
         if room in ("cli", "viewer", "errors.py") or path.name in ("tev.py", "saving.py", "plotting.py"):
             continue
         for text in _messages(ast.parse(path.read_text(encoding="utf-8"))):
-            if wrong.search(text):
+            if wrong.search(text.replace("`pbrt --upgrade FILE`", "")):  # a command of pbrt's
                 found.append(f"{path.name}: {text}")
     assert not found
 

@@ -12,6 +12,7 @@ import pytest
 from fields import RAYS, exit_distance, trilinear
 from probe import Probe, grid_volume, medium_of, scene_of
 from stat_tests import FALSE_ALARM, largest_z, require_precision, sidak, z_score
+from tiers import quick_first
 from walks import (
     BINS,
     assert_weighted_collisions,
@@ -103,8 +104,8 @@ def assert_half_a_percent(values, tau, where):
     assert abs(z) < bound, f"{where}: {z:.1f} sigma"
 
 
-@pytest.mark.parametrize("function", FUNCTIONS)
-@pytest.mark.parametrize(("technique", "majorant"), cases("technique"))
+@quick_first("function", FUNCTIONS)
+@quick_first(("technique", "majorant"), cases("technique"))
 def test_collisions_are_those_of_the_classified_density(probes, technique, majorant, function):
     probe = probes(function, technique=technique, majorant=majorant)
     ray = "oblique"
@@ -119,8 +120,8 @@ def test_collisions_are_those_of_the_classified_density(probes, technique, major
     assert_half_a_percent(np.where(t >= 0, weights[:, 0], 0.0).astype(float), tau[-1], where)
 
 
-@pytest.mark.parametrize("function", FUNCTIONS)
-@pytest.mark.parametrize(("transmittance", "majorant"), cases("transmittance"))
+@quick_first("function", FUNCTIONS)
+@quick_first(("transmittance", "majorant"), cases("transmittance"))
 def test_transmittance_is_that_of_the_classified_density(probes, transmittance, majorant, function):
     probe = probes(function, technique="delta", transmittance=transmittance, majorant=majorant)
     length, (_, tau) = exit_distance(*RAYS["backwards"]), exact(function, "backwards")

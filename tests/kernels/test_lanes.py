@@ -9,6 +9,7 @@ from lane_walks import lane_walks
 from probe import Probe, medium_of, scene_of
 from scipy import stats
 from stat_tests import FALSE_ALARM, largest_z, require_precision, sidak, z_score
+from tiers import quick_first
 from walks import collision_p_value, exact_depth, probes_of, scene_with
 
 from clvol.accel import costs
@@ -32,7 +33,7 @@ def probes(device):
     return probes_of(device, lanes="8")
 
 
-@pytest.mark.parametrize(("majorant", "lookup"), WALKED)
+@quick_first(("majorant", "lookup"), WALKED)
 def test_collisions_in_lanes_follow_the_exact_distribution(probes, majorant, lookup):
     level = sidak(FALSE_ALARM, CASES)
     for field, (name, ray) in itertools.product(FIELDS, RAYS.items()):
@@ -42,8 +43,8 @@ def test_collisions_in_lanes_follow_the_exact_distribution(probes, majorant, loo
         assert collision_p_value(t, exact_depth(field, name)[0], length) > level, f"{field}, ray {name}"
 
 
-@pytest.mark.parametrize("transmittance", TRANSMITTANCES)
-@pytest.mark.parametrize(("majorant", "lookup"), WALKED)
+@quick_first("transmittance", TRANSMITTANCES)
+@quick_first(("majorant", "lookup"), WALKED)
 def test_transmittance_in_lanes_is_unbiased(probes, transmittance, majorant, lookup):
     for field, (name, ray) in itertools.product(FIELDS, RAYS.items()):
         probe = probes(field, majorant=majorant, lookup=lookup, transmittance=transmittance)
@@ -84,7 +85,7 @@ def transposed(found):
 # -- widths, cells, steps ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
+@quick_first(
     ("family", "lookup"), [("technique", "exact"), ("technique", "stochastic"), ("transmittance", "exact")]
 )
 def test_walks_have_the_same_bits_at_every_width(probes, family, lookup):

@@ -12,6 +12,7 @@ import pytest
 from fields import CHROMATIC, FIELDS, RAYS, exit_distance
 from probe import Probe, medium_of, scene_of
 from stat_tests import FALSE_ALARM, largest_z, require_precision, sidak, z_score
+from tiers import quick_first, quick_where
 from walks import (
     BINS,
     assert_weighted_collisions,
@@ -44,6 +45,12 @@ def combinations(family):
     ]
 
 
+def is_quick(combination):
+    """Of every technique or transmittance two: with a grid, and stochastic look-ups with a tree."""
+    _, majorant, lookup = combination
+    return (majorant == "grid" and lookup == "exact") or (majorant == "kdtree" and lookup == "stochastic")
+
+
 def chromatic_combinations(family):
     """The same, stochastic look-ups over grids only."""
     return [c for c in combinations(family) if c[2] == "exact" or c[1] == "grid"]
@@ -60,7 +67,7 @@ def choices_of(family, name, majorant, lookup):
     return other | {"majorant": majorant, "lookup": lookup}
 
 
-@pytest.mark.parametrize(("technique", "majorant", "lookup"), combinations("technique"))
+@quick_where(("technique", "majorant", "lookup"), combinations("technique"), is_quick)
 def test_collisions_follow_the_exact_distribution(probes, technique, majorant, lookup):
     weighted = registry.TECHNIQUES[technique].weighted
     level, bound = sidak(FALSE_ALARM, GREY_CASES), largest_z(GREY_CASES * (BINS + 1))
@@ -99,8 +106,8 @@ def test_collisions_of_each_channel_follow_its_distribution(probes, technique, m
             assert_weighted_collisions(t, own, tau[channel], length, bound, where)
 
 
-@pytest.mark.parametrize("family", ["technique", "transmittance"])
-@pytest.mark.parametrize("majorant", registry.MAJORANTS)
+@quick_first("family", ["technique", "transmittance"])
+@quick_first("majorant", registry.MAJORANTS)
 def test_minus_nothing_in_a_direction_is_nothing(probes, family, majorant):
     """A direction along an axis has zeros of both signs; -1/0 must not be where a plane is crossed."""
     walks = {"technique": sample_walks, "transmittance": transmittance_walks}[family]
@@ -130,7 +137,7 @@ def assert_transmittance(transmittance, values, exact, comparisons, where):
         assert_mean(values, exact, comparisons, where)
 
 
-@pytest.mark.parametrize(("transmittance", "majorant", "lookup"), combinations("transmittance"))
+@quick_where(("transmittance", "majorant", "lookup"), combinations("transmittance"), is_quick)
 def test_transmittance_is_unbiased(probes, transmittance, majorant, lookup):
     for field, (name, ray) in itertools.product(FIELDS, RAYS.items()):
         probe = probes(field, **choices_of("transmittance", transmittance, majorant, lookup))

@@ -10,6 +10,7 @@ import re
 import numpy as np
 import pyopencl as cl
 import pytest
+from tiers import quick_first
 
 import clvol
 from clvol import layout
@@ -275,7 +276,7 @@ def test_what_a_contract_does_not_name_does_not_compile(device, monkeypatch, sta
 # -- contracts against what happens ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", CASES)
+@quick_first("name", CASES)
 def test_a_launch_moves_paths_and_writes_values_as_its_contract_says(device, monkeypatch, name):
     described, choices = CASES[name]
     session = Session.for_scene(device, described(), Choices(majorant="grid", **choices), 0, pool=256)

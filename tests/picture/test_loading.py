@@ -27,7 +27,10 @@ def saved(result: Result, folder: Path, name: str = "a.exr", **options: object) 
     return clvol.load_result(folder / name)
 
 
-@pytest.fixture(scope="module", params=["joint", "sobol", "independent"])
+OTHERS = [pytest.param(sampler, marks=pytest.mark.contract) for sampler in ("sobol", "independent")]
+
+
+@pytest.fixture(scope="module", params=["joint", *OTHERS])
 def parts(request: pytest.FixtureRequest) -> list[Result]:
     """The first samples, the others, and all of them."""
     ranges = (0, CUT), (CUT, SPP - CUT), (0, SPP)

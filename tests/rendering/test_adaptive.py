@@ -18,6 +18,7 @@ from click.testing import CliRunner
 from pictures import ball, box, gridded, homogeneous, picture, volume
 from scipy import optimize, stats
 from stat_tests import FALSE_ALARM
+from tiers import quick_first
 
 import clvol
 from clvol.cli.main import main
@@ -207,7 +208,7 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@quick_first("case", CASES)
 def test_lists_of_pixels_give_the_bits_of_an_ordinary_render(device, case):
     scene, sampler, aovs, spp = CASES[case]
     ordinary = clvol.render(scene(), spp=spp, seed=5, sampler=sampler, aov=aovs)

@@ -13,6 +13,7 @@ import OpenImageIO as oiio  # noqa: N813
 import pytest
 from click.testing import CliRunner
 from pictures import box, gridded, homogeneous, picture, volume
+from tiers import quick_first
 
 import clvol
 from clvol import layout
@@ -73,7 +74,7 @@ def test_alpha_is_one_less_the_transmittance_in_every_technique(scale, technique
     assert_alpha(alpha_of(slab(layered(scale)), technique=technique), expected)
 
 
-@pytest.mark.parametrize(("background", "lanes"), [("sampled", "8"), ("expected", "8"), ("expected", "off")])
+@quick_first(("background", "lanes"), [("sampled", "8"), ("expected", "8"), ("expected", "off")])
 def test_alpha_in_lanes_and_where_walks_expect_the_background(background, lanes):
     options = {"technique": "delta", "background": background, "lanes": lanes, "majorant_scale": 2.0}
     result = clvol.render(slab(layered()), spp=1 << 14, seed=7, **options)

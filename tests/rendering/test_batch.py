@@ -5,6 +5,7 @@ import signal
 import numpy as np
 import pytest
 from signals import press_key
+from tiers import quick_first
 
 import clvol
 from clvol import OptionError, SceneError, load_dict
@@ -72,7 +73,7 @@ def assert_parts_are(result, singles):
         assert result.stats[name] == sum(one.stats[name] for one in singles)
 
 
-@pytest.mark.parametrize("sampler", ["joint", "independent"])
+@quick_first("sampler", ["joint", "independent"])
 def test_each_part_has_the_bits_of_its_sensor_alone(scene, sampler):
     options = OPTIONS | {"sampler": sampler, "aov": ["depth"]}
     result = clvol.render(scene, **options)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.special import expn
+from tiers import quick_first
 
 import clvol
 from clvol.errors import Error
@@ -61,7 +62,7 @@ def of_tetrahedron():
     return float((areas + normals[:, 2]).sum() / areas.sum() / 2)
 
 
-@pytest.mark.parametrize(
+@quick_first(
     ("name", "shape", "expected"),
     [
         ("rectangle", {"type": "rectangle"}, 1.0),
@@ -74,6 +75,7 @@ def of_tetrahedron():
         ("mesh", TETRAHEDRON, of_tetrahedron()),
         ("cube", {"type": "cube", "to_world": clvol.scale([2, 1, 0.5])}, (8 * 0.5 + 6 * 0.5) / 14),
     ],
+    count=4,
 )
 def test_under_half_a_sky_it_is_by_the_angle_of_the_normals(name, shape, expected):
     """Of a plane at an angle a: (1 + cos a) / 2."""

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pictures import box, gridded, homogeneous, mean_and_error, picture, volume
 from stat_tests import largest_z
+from tiers import quick_first
 
 import clvol
 from clvol.planning.settled import FAR_APART
@@ -47,7 +48,7 @@ def assert_thin_channel(result, depth, error):
     assert abs(mean[2] - exact) < bound, f"{mean[2]} ± {errors[2]}, not {exact}"
 
 
-@pytest.mark.parametrize("made", [uniform, grid])
+@quick_first("made", [uniform, grid])
 def test_auto_shows_a_channel_a_million_times_thinner(made, caplog):
     depths = 1e3, 5e2, 1e-3
     result = clvol.render(lit(made(depths)), spp=1 << 15, seed=1)

@@ -5,6 +5,7 @@ import pytest
 from fields import RAYS, exit_distance, trilinear
 from pictures import box, gridded, picture, volume
 from probe import Probe, grid_volume, medium_of, scene_of
+from tiers import quick_first
 from walks import sample_walks, transmittance_walks, unbiased
 
 from clvol import render
@@ -93,8 +94,8 @@ def chromatic_scene(albedo):
     return scene_of(medium, (ConstantEmitter(), DirectionalEmitter((2.0,), (0.0, -1.0, 0.0))))
 
 
-@pytest.mark.parametrize("absorption", ["sample", "weight"])
-@pytest.mark.parametrize("technique", ["spectral", "regular"])
+@quick_first("absorption", ["sample", "weight"])
+@quick_first("technique", ["spectral", "regular"])
 def test_with_history_no_weight_exceeds_the_number_of_channels(technique, absorption):
     scene = chromatic_scene((0.99, 0.9, 0.999))
     no_roulette = type(scene.integrator)(rr_depth=1_000_000)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tiers import quick_first
 from walks import unbiased
 
 import clvol
@@ -80,8 +81,8 @@ RAYS = {
 }
 
 
-@pytest.mark.parametrize("ray", RAYS)
-@pytest.mark.parametrize("technique", TECHNIQUES)
+@quick_first("ray", RAYS)
+@quick_first("technique", TECHNIQUES, count=2)
 def test_what_is_seen_through_them_goes_by_direction(technique, ray):
     eye, target, a, b = RAYS[ray]
     expected = np.exp(-area(np.subtract(b, a)) * depth_between(a, b))
@@ -92,8 +93,8 @@ def test_what_is_seen_through_them_goes_by_direction(technique, ray):
     assert abs(plain / expected - 1) > 0.04
 
 
-@pytest.mark.parametrize("kind", ["homogeneous", "heterogeneous"])
-@pytest.mark.parametrize("transmittance", TRANSMITTANCES)
+@quick_first("kind", ["homogeneous", "heterogeneous"])
+@quick_first("transmittance", TRANSMITTANCES)
 def test_shadows_go_by_the_direction_of_light(transmittance, kind):
     """A floor below the cube, which the sun reaches through it."""
     sun = np.array([0.3, 0.2, -1.0])
@@ -141,7 +142,7 @@ def scattered_once(sun, kind, n=400):
     return 0.7 * phase * area(view) * total * 2 / n
 
 
-@pytest.mark.parametrize("kind", ["homogeneous", "heterogeneous"])
+@quick_first("kind", ["homogeneous", "heterogeneous"])
 def test_light_scattered_once_is_its_integral(kind):
     sun = [0.5, -0.3, -0.6]
     light = {"type": "directional", "direction": sun, "irradiance": 1.0}
@@ -158,8 +159,8 @@ def test_light_scattered_once_is_its_integral(kind):
     assert_mean(result, scattered_once(sun, kind))
 
 
-@pytest.mark.parametrize("technique", ["delta", "regular", "spectral", "decomposition"])
-@pytest.mark.parametrize("majorant", ["grid", "kdtree", "global"])
+@quick_first("technique", ["delta", "regular", "spectral", "decomposition"])
+@quick_first("majorant", ["grid", "kdtree", "global"])
 def test_nothing_shows_in_a_furnace(technique, majorant):
     """Albedo 1, two media that overlap, and a colour in one of them."""
     other = {"type": "homogeneous", "sigma_t": 0.5, "albedo": 1.0, "phase": {"type": "hg", "g": 0.4}}

@@ -8,6 +8,7 @@ import pytest
 from fields import exit_distance
 from probe import Probe, grid_volume, scene_of
 from stat_tests import largest_z, z_score
+from tiers import quick_first
 from walks import sample_walks, transmittance_walks, unbiased
 
 from clvol.accel.controls import LONGEST_GROWTH, control, residual
@@ -37,8 +38,8 @@ def assert_seen(values, exact, comparisons):
     assert abs(z_score(values.mean(dtype=float), error**2, exact)) < bound
 
 
-@pytest.mark.parametrize("majorant", registry.MAJORANTS)
-@pytest.mark.parametrize("kind", registry.CONTROLS)
+@quick_first("majorant", registry.MAJORANTS)
+@quick_first("kind", registry.CONTROLS)
 def test_residual_ratio_tracking_sees_through_a_gap(device, kind, majorant):
     probe = probe_with(device, transmittance="residual-ratio", control=kind, majorant=majorant)
     values, flaws, _ = transmittance_walks(probe, GAP, LENGTH, WALKS)
@@ -52,7 +53,7 @@ def test_every_transmittance_sees_through_a_gap(device, transmittance):
     assert_seen(transmittance_walks(probe, GAP, LENGTH, WALKS // 8)[0][:, 0], EXACT, 1)
 
 
-@pytest.mark.parametrize("technique", unbiased("technique"))
+@quick_first("technique", unbiased("technique"), count=3)
 def test_every_technique_passes_a_gap(device, technique):
     probe = probe_with(device, 10 * WALL, technique=technique, majorant="grid")
     t, weights, *_ = sample_walks(probe, GAP, LENGTH, WALKS // 8)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from pictures import assert_matches, box, gridded, picture, volume
 from stat_tests import assert_same_picture, seed_of
+from tiers import quick_first
 
 import clvol
 from clvol import layout, render
@@ -58,8 +59,8 @@ def layered(gathering, colours):
     return render(seen(glowing(SCALES[colours])), spp=spp, seed=seed, **options)
 
 
-@pytest.mark.parametrize("colours", SCALES)
-@pytest.mark.parametrize("gathering", GATHERINGS)
+@quick_first("colours", SCALES)
+@quick_first("gathering", GATHERINGS)
 def test_the_emission_of_layers_is_that_of_quadrature(gathering, colours):
     assert_matches(layered(gathering, colours), emitted(SCALES[colours]), bias=0.03)
 
@@ -70,8 +71,8 @@ def test_strata_have_a_fraction_of_the_noise(colours):
     assert noise["strata"] < (0.5 if colours == "grey" else 0.8) * noise["collision"]
 
 
-@pytest.mark.parametrize("steps", [1, 3])
-@pytest.mark.parametrize("colours", SCALES)
+@quick_first("steps", [1, 3])
+@quick_first("colours", SCALES)
 def test_legs_neither_lose_nor_double_emission(bounds, steps, colours):
     """A flight that collided has no next leg; one that did not gathers there what is beyond."""
     bounds(WALK_STEPS=steps)
@@ -94,7 +95,7 @@ def lumpy(**options):
     return render(lumps(), spp=1 << 11, seed=seed_of("lumpy", *options.values()), **options)
 
 
-@pytest.mark.parametrize(
+@quick_first(
     "options",
     [
         {"gathering": "collision"},

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from pictures import assert_matches, assert_mean, assert_pooled, ball, box, hg, picture, volume
 from stat_tests import seed_of
+from tiers import quick_first
 from walks import unbiased
 
 import clvol
@@ -142,7 +143,7 @@ def answer(scale):
     return gathered(np.array(scale)[:, None] * along(PROFILE), along(GLOW))
 
 
-@pytest.mark.parametrize(("technique", "scale"), QUICK)
+@quick_first(("technique", "scale"), QUICK)
 def test_the_glow_of_layers_is_that_of_quadrature(technique, scale):
     assert_matches(layered(technique, scale), answer(scale), bias=0.02)
 

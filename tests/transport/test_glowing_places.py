@@ -11,6 +11,7 @@ import pytest
 from pictures import assert_matches, assert_pooled, box, hg, volume
 from stat_tests import seed_of
 from test_glow import COLOURED, CUBE, GREY, TECHNIQUES, along, const, gathered, layers, seen
+from tiers import quick_first
 
 from clvol import render
 from clvol.device import programs
@@ -53,7 +54,7 @@ def crossed(technique, scale, **options):
     return render(crossing(scale), technique=technique, **options)
 
 
-@pytest.mark.parametrize(("technique", "scale"), [("delta", GREY), ("spectral", COLOURED)])
+@quick_first(("technique", "scale"), [("delta", GREY), ("spectral", COLOURED)])
 def test_media_that_overlap_glow_as_quadrature_has_it(technique, scale):
     assert_matches(crossed(technique, scale), of_crossing(scale), bias=0.03)
 

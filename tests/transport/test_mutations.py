@@ -24,6 +24,8 @@ from clvol.volumes import bricks
 WALKS = 1 << 18
 RAY = RAYS["oblique"]
 LENGTH = exit_distance(*RAY)
+SKY = np.float32([1.0, 0.999, 1.0])
+"""What the device has of it: samples are so even that they tell it from 0.999."""
 
 
 @pytest.fixture
@@ -79,13 +81,13 @@ def chromatic_furnace():
     medium = gridded(volume(values, lower, upper), 1.0, scale=(3.0, 1.5, 0.5))
     eye = (0.5, 0.8, -4.0)
     scene = picture(
-        [box(lower, upper, medium)], (ConstantEmitter((1, 0.999, 1)),), eye, (0, 0, 0), 24.0, (4, 4)
+        [box(lower, upper, medium)], (ConstantEmitter(tuple(SKY.tolist())),), eye, (0, 0, 0), 24.0, (4, 4)
     )
     return render(scene, spp=1 << 13, seed=1, technique="spectral")
 
 
 def test_a_weight_reset_at_the_exit_is_caught(mutate):
-    assert_matches(chromatic_furnace(), [1.0, 0.999, 1.0])
+    assert_matches(chromatic_furnace(), SKY)
     mutate(
         "stages/medium_sample.h",
         "    record_walk(scene, slot, tally, collision.beta, collision.emission);",
@@ -93,7 +95,7 @@ def test_a_weight_reset_at_the_exit_is_caught(mutate):
         "    record_walk(scene, slot, tally, kept, collision.emission);",
     )
     with pytest.raises(AssertionError, match="deviates"):
-        assert_matches(chromatic_furnace(), [1.0, 0.999, 1.0])
+        assert_matches(chromatic_furnace(), SKY)
 
 
 def test_a_halo_left_out_is_caught(device, monkeypatch):

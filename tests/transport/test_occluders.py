@@ -12,6 +12,7 @@ import pytest
 import trimesh
 from pictures import assert_mean, picture
 from surface_scenes import UNREACHED, meshed
+from tiers import quick_first
 
 import clvol
 from clvol.scene.materials import Diffuse, Null
@@ -145,8 +146,8 @@ def floor_radiance(light, height, others=(), shift=0.0, passable=False, samples=
 # -- what stands before a lamp -----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("passable", [False, True], ids=["opaque", "passable"])
-@pytest.mark.parametrize("kind", KINDS)
+@quick_first("passable", [False, True], ids=["opaque", "passable"])
+@quick_first("kind", KINDS, count=3)
 def test_nothing_passes_an_occluder(kind, passable):
     height = 3.0
     light = lamps(0.05, height)[kind][0]

@@ -11,6 +11,7 @@ import pytest
 from pictures import assert_matches, ball, box, camera_rays, gauss, hg, homogeneous, mean_and_error
 from stat_tests import assert_same_picture, image_mean, largest_z, z_score
 from surface_scenes import DARK, GLASS, SKY, found, icosphere, mesh_box, moved, sampled, surfaced
+from tiers import quick_first
 
 from clvol import render
 from clvol.scene.materials import Bitmap, Conductor, Dielectric, Diffuse, Mask, RoughDielectric, TwoSided
@@ -64,7 +65,7 @@ FURNACES = {
 }
 
 
-@pytest.mark.parametrize("name", FURNACES)
+@quick_first("name", FURNACES, count=3)
 def test_a_furnace_found_by_its_paths_is_one_in_every_sample(name):
     """Each path weighs 1: refraction's eta² cancels to rounding, and roulette keeps what is worth 1."""
     result = show(found(FURNACES[name]), spp=256)
@@ -84,7 +85,7 @@ def test_in_glass_no_light_can_be_sampled_and_every_path_weighs_one():
     assert np.abs(result.image - 1).max() < 1e-4
 
 
-@pytest.mark.parametrize(
+@quick_first(
     ("medium", "known", "uncertain"),
     [(None, 0.98109, 0.00009), (MILK, 0.94195, 0.00023)],
     ids=["clear", "milky"],
@@ -283,7 +284,7 @@ def integrating_sphere(depth, make=found, reflectance=0.7):
     return make([wall, *veils], eye=(0.1, 0.2, -0.3), target=(0, 0, 1), fov=60.0, max_depth=depth)
 
 
-@pytest.mark.parametrize("depth", [0, 1, 2, 3, 6])
+@quick_first("depth", [0, 1, 2, 3, 6], count=2)
 def test_depth_counts_scatterings_and_neither_boundaries_nor_holes(depth):
     expected = sum(0.7**k for k in range(depth))
     result = show(integrating_sphere(depth), spp=256, roulette="depth")
@@ -309,8 +310,8 @@ def test_roulette_in_glass_leaves_the_picture_as_it_is():
 # -- hostile views -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("medium", [None, MILK], ids=["clear", "foggy"])
-@pytest.mark.parametrize("target", [(0, 0, 1), (1, 1, 1), (1, 0, 0), (0.3, 0.2, 0.9)])
+@quick_first("medium", [None, MILK], ids=["clear", "foggy"])
+@quick_first("target", [(0, 0, 1), (1, 1, 1), (1, 0, 0), (0.3, 0.2, 0.9)])
 def test_no_light_leaks_into_a_closed_black_room(target, medium):
     """Along axes, at edges and corners, with the eye in the middle, on planes of symmetry."""
     walls = surfaced(mesh_box(*UNIT), TwoSided(BLACK, BLACK))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tiers import quick_first
 
 import clvol
 
@@ -75,7 +76,7 @@ def exact(to_world, value, surface, n=600):
     return (facing[..., None] * value(u, v)).sum((0, 1))
 
 
-@pytest.mark.parametrize("name", LIGHTS)
+@quick_first("name", LIGHTS)
 def test_a_floor_has_the_irradiance_of_the_texture(name):
     kind, to_world, texture, value, surface = LIGHTS[name]
     sensor = {

@@ -29,6 +29,7 @@ from pictures import (
 )
 from slabs import HALF_SPACES, SLABS, homogeneous_slab
 from stat_tests import assert_same_picture
+from tiers import quick_first
 
 from clvol import render
 from clvol.scene.records import ConstantEmitter, DirectionalEmitter, PointEmitter
@@ -78,7 +79,7 @@ def test_furnace_without_light_sampling_is_one_to_the_last_bit(pair, eye):
     assert (result.variance == 0).all()
 
 
-@pytest.mark.parametrize(("eye", "absorption"), FURNACES)
+@quick_first(("eye", "absorption"), FURNACES, count=2)
 def test_furnace_of_homogeneous_media_is_one(eye, absorption):
     scene = furnace(homogeneous_pair, eye, UNLIT, max_depth=UNREACHED_DEPTH)
     result = render(scene, spp=24576, seed=2, transmittance="ratio", absorption=absorption)

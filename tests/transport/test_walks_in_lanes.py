@@ -5,6 +5,7 @@ import pytest
 from every_bit import SPP, digest, rendered
 from pictures import box, gridded, hg, homogeneous, picture, volume
 from stat_tests import assert_same_picture, seed_of
+from tiers import quick_first
 
 import clvol
 from clvol.planning.choices import Choices
@@ -81,7 +82,7 @@ def sixteen():
     return rendered(cloud(), spp=SPP, seed=7, lanes="16")
 
 
-@pytest.mark.parametrize("options", [{"lanes": "4"}, {"lanes": "8"}, {"lanes": "16", "pool": 3000}], ids=str)
+@quick_first("options", [{"lanes": "4"}, {"lanes": "8"}, {"lanes": "16", "pool": 3000}], ids=str)
 def test_neither_their_number_nor_the_pool_touches_a_bit(sixteen, options):
     assert digest(rendered(cloud(), spp=SPP, seed=7, **options)) == digest(sixteen)
 

@@ -13,6 +13,7 @@ from fields import exit_distance, optical_depth
 from probe import Probe, scene_of
 from sparse_grids import dense_of, grid_of, lumps, medium_of_grid, volume_of
 from stat_tests import FALSE_ALARM, largest_z, sidak, z_score
+from tiers import quick_first
 from trees import leaves_of
 from walks import BINS, collision_p_value, sample_walks, transmittance_walks, unbiased, weighted_z
 
@@ -256,7 +257,7 @@ def majorants_of(names):
     return [(name, "grid") for name in names] + [(names[0], "kdtree")]
 
 
-@pytest.mark.parametrize(("technique", "majorant"), majorants_of(unbiased("technique")))
+@quick_first(("technique", "majorant"), majorants_of(unbiased("technique")), count=2)
 def test_collisions_through_trees_follow_the_exact_distribution(device, trees, depths, technique, majorant):
     probe = Probe(device, scene_of(medium_of_grid(WALKED, (12.0,))), technique=technique, majorant=majorant)
     assert probe.plan.has_tree_grid == (majorant == "grid")
@@ -270,7 +271,7 @@ def test_collisions_through_trees_follow_the_exact_distribution(device, trees, d
             assert collision_p_value(t, tau, length) > sidak(FALSE_ALARM, 2), name
 
 
-@pytest.mark.parametrize(("transmittance", "majorant"), majorants_of(unbiased("transmittance")))
+@quick_first(("transmittance", "majorant"), majorants_of(unbiased("transmittance")), count=2)
 def test_transmittance_through_trees_has_the_exact_mean(device, trees, depths, transmittance, majorant):
     medium = medium_of_grid(WALKED, (12.0,))
     probe = Probe(device, scene_of(medium), transmittance=transmittance, majorant=majorant)
