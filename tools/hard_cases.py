@@ -52,6 +52,17 @@ each picture to that number. `docs/hard-cases.jsonl` keeps the figures, and on w
 
 `clvol selftest` renders these cases in one way each, with `--quick` some of them. So do `pytest -m contract`
 and `pytest`. `pytest tests/hard -m hard_full` renders them in every way.
+
+What is no mean of a picture has tests of its own:
+
+- a million samples in a pixel, the last samples of 2³² - 1 and one more, which is refused, paths of 1e4 and
+  1e5 scatterings: `tests/hard/test_many.py`
+- numbers of neighbours: `tests/hard/test_random.py`; reported variance: `tests/hard/test_statistics.py`
+- peaks that single precision does not tell, analog techniques and bounds that do not hold, which are refused:
+  `tests/hard/test_cases.py`
+- occluders a hair before lamps of every shape: `tests/transport/test_occluders.py`
+- half-spaces of albedo 0.5 to 0.99, and a white slab, which loses nothing:
+  `tests/transport/test_techniques.py`
 """
 
 

@@ -70,7 +70,7 @@ CASES = (
     *(_glowing(depth) for depth in (1e-8, 1e-5, 1e-2, 1e5)),
     *(_albedo(albedo) for albedo in (0.0, 1e-6, 0.999999, 1.0)),
     Case(
-        "white cube in a furnace, thickness 100: 1e4 scatterings a path",
+        "white cube in a furnace, thickness 100: 1.8e3 scatterings a path",
         GROUP,
         lambda: scenes.furnace([block(100.0)], (0.5, 0.5, 0.5), AHEAD, albedo=1.0, emission=1.0),
         lambda: np.ones(1),
