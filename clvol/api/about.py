@@ -125,8 +125,8 @@ def scene_file_lines(
                 raise faults from None  # they are not all of what can be left out
     return [
         *scene_lines(scene, choices),
-        *(f"refused  {said}" for said in scene.left_out),
-        *(f"taken    {said}" for said in scene.approximated),
+        *(Told(f"refused  {said.marked}") for said in scene.left_out),
+        *(Told(f"taken    {said.marked}") for said in scene.approximated),
     ]
 
 

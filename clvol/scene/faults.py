@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TYPE_CHECKING
 
-from clvol.errors import Error, SceneError, either, spelled_out
+from clvol.errors import Error, SceneError, Told, either, spelled_out
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -73,8 +73,8 @@ class Faults:
 
     def __init__(self) -> None:
         self.errors: list[Error] = []
-        self.left_out: dict[str, None] = {}  # in order
-        self.approximated: dict[str, None] = {}  # what is taken as something else, and as what, in order
+        self.left_out: dict[Told, None] = {}  # in order
+        self.approximated: dict[Told, None] = {}  # what is taken as something else, and as what, in order
         self.lost_ids: set[str] = set()  # of plugins that could not be read
         self.lost_file = False  # whether an included file, with whatever ids, could not be read
         self.skips = _skips.get()
@@ -85,9 +85,10 @@ class Faults:
 
     def approximate(self, said: str, where: str) -> None:
         """Say that something is taken as something else: once in the log, with the first one's place."""
-        if said not in self.approximated:
-            self.approximated[said] = None
-            log.warning("%s: %s", where, said)
+        told = Told(said)
+        if told not in self.approximated:
+            self.approximated[told] = None
+            log.warning("%s: %s", where, told)
 
     def note(self, error: Error) -> None:
         """Go on without what the error is about.
@@ -110,10 +111,10 @@ class Faults:
             self._leave_out(SceneError(f"{what} is left out with it", where))
 
     def _leave_out(self, error: Error) -> None:
-        said = f"{error.where}: {error.what}"
-        if said not in self.left_out:
-            self.left_out[said] = None
-            log.warning("left out: %s", said)
+        told = Told(f"{error.where}: {error.what}")
+        if told not in self.left_out:
+            self.left_out[told] = None
+            log.warning("left out: %s", told)
 
     def check(self) -> None:
         """Raise what there is: the one error, or `FaultyError`."""

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
+    from clvol.errors import Told
     from clvol.volumes.transfer import Transfer, Transfers
 
 Spectrum = tuple[float, ...]
@@ -371,8 +372,8 @@ class Scene:
     source: str = ""  # file the scene came from, for messages and metadata
     files: tuple[str, ...] = field(default=(), repr=False)  # all it was read from: nothing replaces them
     sensors: tuple[Sensor, ...] = ()
-    approximated: tuple[str, ...] = field(default=(), repr=False)  # what is taken as what
-    left_out: tuple[str, ...] = field(default=(), repr=False)  # what was not supported: places and reasons
+    approximated: tuple[Told, ...] = field(default=(), repr=False)  # what is taken as what
+    left_out: tuple[Told, ...] = field(default=(), repr=False)  # what was not supported: places and reasons
     kept: Kept = field(default_factory=Kept, repr=False)
 
     def __post_init__(self) -> None:

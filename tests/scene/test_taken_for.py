@@ -3,8 +3,10 @@
 import logging
 
 import pytest
+from click.testing import CliRunner
 
 import clvol
+from clvol.cli.main import main
 from clvol.scene.integrator import OTHERS, WRAPPERS
 from clvol.scene.records import Integrator
 from clvol.scene.sensor import OTHER_SAMPLERS
@@ -83,3 +85,19 @@ def test_integrators_that_see_no_media_are_refused_where_there_are_some():
         with pytest.raises(clvol.SceneError, match=f"'{name}' sees no media"):
             clvol.load_dict(scene_with() | {"it": {"type": name}, "fog": medium})
     clvol.load_dict(scene_with() | {"it": {"type": "prbvolpath"}, "fog": medium})
+
+
+def test_what_is_said_is_in_the_words_of_python_or_of_the_command_line(caplog, tmp_path):
+    """Texts of both forms hold characters of no alphabet between them, which nobody is to see."""
+    with caplog.at_level(logging.WARNING, "clvol"):
+        scene = clvol.load_dict(scene_with() | {"it": {"type": "volpath", "timeout": 5.0}})
+    said = "no limit: time=60 ends a render after a time"
+    assert said in caplog.text
+    assert said in clvol.render(scene, spp=1).metadata["approximated"]
+    (tmp_path / "scene.xml").write_text(
+        '<scene version="3.0.0"><integrator type="volpath"><float name="timeout" value="5"/></integrator>'
+        '<sensor type="perspective"/><emitter type="constant"/></scene>'
+    )
+    told = CliRunner().invoke(main, ["info", str(tmp_path / "scene.xml")]).output
+    assert "no limit: --time 60 ends" in " ".join(told.split())
+    assert not any(0xE000 <= ord(letter) < 0xF900 for letter in told + caplog.text)
