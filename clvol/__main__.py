@@ -9,6 +9,9 @@ def main() -> NoReturn:
 
     While modules are loaded Ctrl-C ends the process at once, where Python would print what it was importing.
     Once the work is done the exit status stands, and it is too late.
+
+    Python remembers of an interrupt that it passed an `exec` of text, by which dataclasses are made, and then
+    ends `python -m` by the signal, whatever its status; the next such text makes it forget.
     """
     heeds = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     if heeds:
@@ -21,6 +24,7 @@ def main() -> NoReturn:
         command(prog_name="clvol")
     finally:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+        exec("")
     raise SystemExit
 
 

@@ -251,3 +251,23 @@ def test_nobody_has_to_read_what_a_render_says(tmp_path: Path, stream: str) -> N
     )
     assert done.returncode == 0 and "Traceback" not in done.stderr and "Exception" not in done.stderr
     assert samples_of(tmp_path / "a.exr") >= 1
+
+
+def test_an_interrupt_amid_the_making_of_a_class_leaves_the_status(tmp_path: Path) -> None:
+    """`python -m` would end by the signal, where modules that were loading make their classes by `exec`."""
+    (tmp_path / "interrupted.py").write_text(
+        """import sys
+import clvol.__main__, clvol.cli.main
+
+def command(prog_name):
+    try:
+        exec("raise KeyboardInterrupt")
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+clvol.cli.main.main = command
+clvol.__main__.main()
+"""
+    )
+    done = subprocess.run([sys.executable, "-m", "interrupted"], cwd=tmp_path, check=False)
+    assert done.returncode == 130
