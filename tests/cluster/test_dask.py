@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from dask_clusters import cluster, distributed
 from every_bit import scene
 from signals import press_key
 
@@ -15,24 +16,8 @@ import clvol
 from clvol.cluster import job, on_worker
 from clvol.scene.records import Batch
 
-distributed = pytest.importorskip(
-    "distributed", reason="needs the extra cluster: pip install 'clvol[cluster]'"
-)
 OPTIONS = {"spp": 40, "seed": 3, "sampler": "joint", "aov": ["depth", "largest_weight"]}
 """Ranges are of one sample each."""
-
-
-def cluster(**options):
-    return distributed.LocalCluster(
-        threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs=50, **{"n_workers": 2} | options
-    )
-
-
-@pytest.fixture(scope="module")
-def client():
-    """Two workers that are threads here: what they do is the same, and they start at once."""
-    with cluster(processes=False) as workers, distributed.Client(workers) as made:
-        yield made
 
 
 @pytest.fixture(scope="module")

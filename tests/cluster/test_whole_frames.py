@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from dask_clusters import cluster, distributed
 from every_bit import scene
 
 import clvol
@@ -15,24 +16,8 @@ from clvol.api import sequence, whole
 from clvol.api.sequence import Pictures
 from clvol.cluster import on_worker
 
-distributed = pytest.importorskip(
-    "distributed", reason="needs the extra cluster: pip install 'clvol[cluster]'"
-)
 OPTIONS = {"spp": 8, "seed": 3, "sampler": "joint"}
 COUNT = 5
-
-
-def cluster(**options):
-    return distributed.LocalCluster(
-        threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs=50, **{"n_workers": 2} | options
-    )
-
-
-@pytest.fixture(scope="module")
-def client():
-    """Two workers that are threads here: what they do is the same, and they start at once."""
-    with cluster(processes=False) as workers, distributed.Client(workers) as made:
-        yield made
 
 
 def frame(number):
