@@ -17,7 +17,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import click
-from benchmarks import chromatic
+from benchmarks import chromatic, scaling
 from benchmarks.cloud import cloud_rows, measure_cloud, mitsuba_here, show_cloud
 from benchmarks.costs import (
     load_rows,
@@ -58,6 +58,7 @@ ROWS: dict[str, Callable[[Figures], list[Row]]] = {
     "load": load_rows,
     "memory": memory_rows,
     "chromatic": chromatic.chromatic_rows,
+    "scaling": scaling.scaling_rows,
 }
 """The table's rows of each command's figures."""
 ROUGH: dict[str, dict[str, object]] = {
@@ -222,6 +223,7 @@ def pool(
 main.add_command(chromatic.main, "chromatic")
 main.add_command(scenes)
 main.add_command(curve)
+main.add_command(scaling.main, "scaling")
 
 
 def rough_option(command: Callable) -> Callable:

@@ -242,6 +242,20 @@ def test_what_cannot_be_measured_is_left_out_and_told(tool, monkeypatch: pytest.
     assert "LEFT OUT: cloud: no Mitsuba here\nLEFT OUT: room: no Mitsuba here" in outcome.output
 
 
+def test_workers_scale_by_their_medians_and_are_not_more_than_cores(tool, monkeypatch) -> None:
+    scaling = tool("benchmarks.scaling")
+    taken = {1: iter([16.0, 10.0, 30.0]), 2: iter([8.0, 8.0, 2.0])}
+    monkeypatch.setattr(scaling, "turn", lambda *arguments: next(taken[arguments[3]]))
+    monkeypatch.setattr(scaling.os, "sched_getaffinity", lambda _: {0, 1})
+    figures = scaling.measure_scaling("cloud.xml", 16, 4, 2, 3)
+    [row] = scaling.scaling_rows(figures)
+    assert row.measured == "2.00 times" and row.met and row.aim == "at least 1.8"
+    figures["seconds"]["2"]["median"] = 9.0
+    assert not scaling.scaling_rows(figures)[0].met
+    with pytest.raises(click.ClickException, match="3 workers would share 2 cores"):
+        scaling.measure_scaling("cloud.xml", 16, 4, 3, 3)
+
+
 def test_ray_meshes_are_closed_and_of_the_size_asked_for(tool) -> None:
     vertices, faces = tool("benchmarks.rays").knobbly_sphere(3000)
     assert abs(len(faces) - 3000) < 200
