@@ -76,6 +76,13 @@ _PHOTONS = {
     **dict.fromkeys(("global_lookup_radius", "caustic_lookup_radius", "initial_radius", "alpha"), float),
     **dict.fromkeys(("max_passes", "caustic_lookup_size", "volume_lookup_size"), int),
 }
+BEFORE = {
+    "volpath_simple": Other(True),
+    "bdpt": Other(True, {"light_image": bool, "sample_direct": bool}),
+    **{name: Other(True, _PHOTONS) for name in ("photonmapper", "photonmap", "ppm", "sppm")},
+    **{name: Other(True, _MUTATIONS) for name in ("mlt", "pssmlt", "erpt")},
+}
+"""Those of Mitsuba before version 2, which all have what `volpath` has."""
 OTHERS: dict[str, Other] = {
     "prbvolpath": Other(True, max_depth=6),
     "prb": Other(False, max_depth=6),
@@ -84,11 +91,7 @@ OTHERS: dict[str, Other] = {
     "direct_projective": Other(False, _PROJECTIVE | _SAMPLES, 2, fixed=True),
     "direct": Other(False, _SAMPLES, 2, fixed=True),
     "ptracer": Other(False),
-    # Mitsuba's before version 2.
-    "volpath_simple": Other(True),
-    "bdpt": Other(True, {"light_image": bool, "sample_direct": bool}),
-    **{name: Other(True, _PHOTONS) for name in ("photonmapper", "photonmap", "ppm", "sppm")},
-    **{name: Other(True, _MUTATIONS) for name in ("mlt", "pssmlt", "erpt")},
+    **BEFORE,
 }
 """Integrators that are served by ours, with what they differ in."""
 

@@ -184,11 +184,19 @@ def load_file(path: str | Path, **defaults: object) -> Scene:
     """
     if not isinstance(path, str | os.PathLike):
         raise SceneError(f"load_file takes a file's name, not {shown(path)}", hint="load_dict takes dicts")
-    if is_pbrt(path):
-        return _loaded(
-            lambda faults: read_pbrt(Path(path), defaults, faults), str(path), plugins=_WITH_MESHES
-        )
-    return _of_xml(lambda faults: read_xml(Path(path), defaults, faults), source=str(path))
+    return load_nodes(path, defaults)[0]
+
+
+def load_nodes(path: str | os.PathLike[str], defaults: Mapping[str, object]) -> tuple[Scene, Node]:
+    """As `load_file`, and the nodes that the scene was made from."""
+    nodes: list[Node] = []
+    read_file, load = (read_pbrt, _of_pbrt) if is_pbrt(path) else (read_xml, _of_xml)
+
+    def read(faults: Faults) -> Node:
+        nodes.append(read_file(Path(path), defaults, faults))
+        return nodes[0]
+
+    return load(read, str(path)), nodes[0]
 
 
 def load_string(text: str, **defaults: object) -> Scene:
@@ -265,6 +273,11 @@ def load_sensor(given: Mapping[str, object]) -> tuple[Sensor, set[str]]:
     if not isinstance(made, Sensor):
         raise SceneError("an irradiancemeter outside a shape measures nothing", node.where, sensor.IN_A_SHAPE)
     return made, {library.kind_of(library.resolve(value)) for value in inside}
+
+
+def _of_pbrt(read: Callable[[Faults], Node], source: str) -> Scene:
+    """As `_loaded`, with the shapes that such files have."""
+    return _loaded(read, source, plugins=_WITH_MESHES)
 
 
 def _of_xml(read: Callable[[Faults], Node], source: str = "") -> Scene:

@@ -18,6 +18,8 @@ log = logging.getLogger("clvol")
 MAX_INDICES = 2**31 - 1
 FAR = 8.0
 """A mesh this many times its size away from its origin gets an origin of its own: floats are coarse there."""
+UNIT = 2.0**-23
+"""How far the length of a float32 vector that was made unit is from 1 at most."""
 _CHUNK = 2**17
 """Triangles worked on at a time: what is worked out for each corner needs several times a mesh's memory."""
 
@@ -159,10 +161,15 @@ def _place_sums(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def _normals(vertices: np.ndarray, faces: np.ndarray, given: np.ndarray | None) -> np.ndarray:
-    """Unit normals of the vertices, float32 (n, 3): those given, else computed (also where they are 0)."""
+    """Unit normals of the vertices, float32 (n, 3): those given, else computed (also where they are 0).
+
+    Those given that are unit in single precision stay as they are, so that a mesh that is written and read
+    again is the same.
+    """
     if given is not None:
         _check_finite(given, "normal")
         length = np.linalg.norm(given, axis=1)
+        length[np.abs(length - 1) < UNIT] = 1
         if (length[faces.reshape(-1)] > 0).all():
             return (given / np.where(length > 0, length, 1)[:, None]).astype(np.float32)
     normals = smooth_normals(vertices, faces)

@@ -349,16 +349,16 @@ def independent(reader: Reader) -> Sampler:
     return Sampler(reader.integer("sample_count", 4, 1), reader.integer("seed", 0, 0, 2**32 - 1))
 
 
+SAMPLERS_BEFORE = ("halton", "hammersley", "sobol")
+"""Those of Mitsuba before version 2."""
 OTHER_SAMPLERS: dict[str, dict[str, type]] = {
     "stratified": {"jitter": bool},
     "multijitter": {"jitter": bool},
     "orthogonal": {"strength": int, "jitter": bool},
     "ldsampler": {"dimension": int},
-    "halton": {"scramble": int},
-    "hammersley": {"scramble": int},
-    "sobol": {"scramble": int},
+    **{name: {"scramble": int} for name in SAMPLERS_BEFORE},
 }
-"""Mitsuba's other samplers, the last three from before its version 2; and their own parameters, by type."""
+"""Mitsuba's other samplers, and their own parameters, by type."""
 
 
 def other_sampler(reader: Reader) -> Sampler:

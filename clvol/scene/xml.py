@@ -85,6 +85,17 @@ def read_xml(path: Path, keywords: Mapping[str, object], faults: Faults) -> Node
     return _finished(reader, reader.file(path, [], ""), keywords, str(path))
 
 
+def is_old(path: Path) -> bool:
+    """Whether an XML file is a scene of Mitsuba before version 2, which is read as one of version 3.
+
+    SceneError for a file that is not there or is no XML.
+    """
+    if not os.path.isfile(path):
+        raise SceneError(f"scene file '{path}' does not exist")
+    _check_xml(path)
+    return parse_elements(path).attributes.get("version", "")[:1] in ("0", "1")
+
+
 def _check_xml(path: Path) -> None:
     """SceneError for a file that is something else, with what to do about that."""
     with open_regular(path, SceneError, "scene file") as file:

@@ -10,9 +10,8 @@ import numpy as np
 
 from clvol.base.image_reading import UnreadableError, read_stored
 from clvol.base.output_files import check_file, check_spares, output_suffix, write_file
-from clvol.errors import OptionError, either
+from clvol.errors import OptionError
 from clvol.picture.image_io import encode_exr, split_channels
-from clvol.scene.loader import is_scene_file
 from clvol.scene.xml_writing import scene_xml
 
 if TYPE_CHECKING:
@@ -23,17 +22,11 @@ if TYPE_CHECKING:
 
 
 def check_scene(path: StrPath, volume: StrPath) -> None:
-    """Raise OptionError now for a scene's file that could not be written or would replace the volume.
-
-    And for what is a scene already.
-    """
+    """Raise OptionError now for a scene's file that could not be written or would replace the volume."""
     output_suffix(path, (".xml",))
     check_file(path)
     if os.path.realpath(path) == os.path.realpath(volume):
         raise OptionError("would replace the volume", str(path))
-    if is_scene_file(volume):
-        hint = either("load_file takes it", "`clvol render` takes it as it is, `clvol info` tells of it")
-        raise OptionError("is a scene already, not a volume", str(volume), hint)
 
 
 def save_scene(staged: Staged, path: StrPath, overwrite: bool = False) -> list[str]:

@@ -35,14 +35,14 @@ STRANDS = """-2.2 -0.5 0 0.1
 def write_files(folder):
     """Writes everything that the scenes read, and the scenes."""
     rng = np.random.default_rng(1)
-    _write_image(folder / "picture.png", rng.integers(30, 255, (6, 8, 3)).astype(np.uint8))
-    _write_image(folder / "leaf.png", rng.integers(0, 255, (5, 7, 3)).astype(np.uint8))
+    write_image(folder / "picture.png", rng.integers(30, 255, (6, 8, 3)).astype(np.uint8))
+    write_image(folder / "leaf.png", rng.integers(0, 255, (5, 7, 3)).astype(np.uint8))
     sky = rng.uniform(0.1, 0.6, (16, 32, 3)).astype(np.float32)
     sky[2:4, 5:8] = (12, 10, 7)
-    _write_image(folder / "sky.exr", sky)
+    write_image(folder / "sky.exr", sky)
     bends = rng.normal(size=(6, 9, 3)) * (0.5, 0.5, 0) + (0, 0, 1)
     bends /= np.linalg.norm(bends, axis=-1, keepdims=True)
-    _write_image(folder / "normals.exr", (0.5 + 0.5 * bends).astype(np.float32))
+    write_image(folder / "normals.exr", (0.5 + 0.5 * bends).astype(np.float32))
     unit = np.array([[0, 0, 0], [1, 1, 1]])
     write_vol(folder / "smoke.vol", rng.uniform(0, 1, (6, 5, 7)).astype(np.float32) ** 2, unit)
     write_vol(folder / "albedo.vol", rng.uniform(0.4, 1, (4, 4, 4, 3)).astype(np.float32), unit)
@@ -62,7 +62,8 @@ def write_files(folder):
         shutil.copy(scene, folder)
 
 
-def _write_image(path, pixels):
+def write_image(path, pixels):
+    """A picture, in its own type."""
     out = oiio.ImageOutput.create(str(path))
     height, width, channels = pixels.shape
     out.open(str(path), oiio.ImageSpec(width, height, channels, str(pixels.dtype)))

@@ -316,8 +316,11 @@ def test_mistakes_are_told(tmp_path: Path) -> None:
         (["render", SCENES / "fire.xml", "-o", "a.png", "--light", "sun"], "--light is for volumes"),
         (["render", "missing.vdb", "-o", "a.png"], "missing.vdb"),
         (["scene", FIRE, "-o", "fire.vdb"], ".xml"),
-        (["scene", "scenes/slab.xml", "-o", "other.xml"], "is a scene already, not a volume; `clvol render`"),
-        (["scene", "cloud.pbrt", "-o", "other.xml"], "is a scene already"),
+        (
+            ["scene", SCENES / "slab.xml", "-o", "other.xml"],
+            "is a scene already, not a volume; `clvol render`",
+        ),
+        (["scene", "cloud.pbrt", "-o", "other.xml"], "cloud.pbrt' does not exist"),
         (["scene", SCENES / "fire.xml", "-o", "a.xml"], "fire.xml"),
     ],
 )

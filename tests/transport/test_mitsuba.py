@@ -20,6 +20,7 @@ from stat_tests import FALSE_ALARM, image_mean, sidak, tile_means
 import clvol
 from clvol.scene import integrator, sensor
 from clvol.scene.loader import PLUGINS
+from clvol.staging.converting import convert_scene
 
 RUNS = 32
 """Independent renders of Mitsuba, whose scatter is the variance of their mean; few would cost power, as
@@ -164,6 +165,50 @@ def test_irradiance_is_the_same(folder, mitsuba, shape, angle):
     t, freedom, error = welch(theirs[:, 0, 0], result.image[0, 0], result.variance[0, 0], rounding)
     assert not deviating(t, freedom, FALSE_ALARM / 3)
     assert (stats.t.isf(FALSE_ALARM / 18, freedom) * error < BIAS * theirs.mean()).all()
+
+
+PBRT = """
+LookAt 1 1.5 -5  0 0 0  0 1 0
+Camera "perspective" "float fov" 40
+Film "rgb" "integer xresolution" 24 "integer yresolution" 16
+PixelFilter "box"
+Integrator "volpath" "integer maxdepth" 9
+WorldBegin
+LightSource "infinite" "string filename" "square.exr"
+LightSource "point" "point3 from" [3 4 -1] "rgb I" [20 18 9]
+MakeNamedMedium "fog" "string type" "uniformgrid" "integer nx" 2 "integer ny" 2 "integer nz" 3 "float g" .3
+  "float density" [1 2 3 4 5 6 1 2 .5 .1 1 2] "rgb sigma_a" [.1 .1 .1] "rgb sigma_s" [.7 .7 .7]
+  "point3 p0" [-1 -1 -1] "point3 p1" [1 1 1]
+Texture "paint" "spectrum" "imagemap" "string filename" "picture.png" "float scale" .7 "float uscale" 2
+AttributeBegin
+ Material "diffuse" "texture reflectance" "paint"
+ Translate 0 -1.3 0 Scale 3 1 -3
+ Shape "bilinearmesh" "point3 P" [-1 0 -1  1 0 -1  -1 0 1  1 0 1] "point2 uv" [0 0  1 0  0 1  1 1]
+AttributeEnd
+AttributeBegin
+ Material "diffuse" "rgb reflectance" [.8 .3 .2]
+ Translate 1.2 0.5 0.3 Rotate 30 1 2 3 Scale 2 2 2
+ Shape "trianglemesh" "point3 P" [0 0 0  .5 0 0  0 .5 0  0 0 .5]
+   "integer indices" [0 2 1  0 1 3  0 3 2  1 2 3]
+   "normal3 N" [-1 -1 -1  1 0 .1  0 1 .3  .1 0 1]
+AttributeEnd
+AttributeBegin
+ MediumInterface "fog" ""
+ Material "interface"
+ Shape "sphere" "float radius" 1
+AttributeEnd
+"""
+
+
+@pytest.mark.mitsuba
+def test_a_scene_of_pbrt_is_converted_to_one_that_mitsuba_renders_alike(folder, mitsuba):
+    square = np.random.default_rng(5).uniform(0.2, 0.8, (6, 6, 3)).astype(np.float32)
+    mitsuba_scenes.write_image(folder / "square.exr", square)
+    (folder / "told.pbrt").write_text(PBRT)
+    convert_scene(folder / "told.pbrt", folder / "converted.xml", {})
+    found, seen = compare(*both(folder, mitsuba, "converted", {}, 96, 4096), FALSE_ALARM)
+    assert not found, "; ".join(found)
+    assert seen < BIAS
 
 
 @pytest.mark.mitsuba
