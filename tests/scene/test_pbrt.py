@@ -84,6 +84,16 @@ def test_a_matrix_is_written_by_columns_and_blocks_restore(load):
     assert places == [[4, 5, 6], [0, 0, 0]]
 
 
+@pytest.mark.parametrize("block", ["Attribute", "Transform"])
+def test_what_blocks_change_ends_with_them(load, block):
+    """The moments that transforms are for too; PBRT-v4 takes Transform blocks for Attribute blocks."""
+    inside = 'ActiveTransform EndTime Translate 9 0 0 Material "conductor" ReverseOrientation'
+    scene = load(f'{block}Begin {inside} {block}End Translate 1 2 3 Shape "sphere"')
+    assert scene.shapes[0].to_world[:3, 3] == pytest.approx([1, 2, 3])
+    assert type(scene.shapes[0].bsdf).__name__ == "TwoSided"
+    assert not scene.shapes[0].flip_normals
+
+
 def test_instances_stand_under_their_own_transform(load):
     scene = load(
         'ObjectBegin "a" Translate 1 0 0 Shape "sphere" ObjectEnd '

@@ -39,7 +39,6 @@ class Directives:
         self._systems: dict[str, np.ndarray] = {}
         self._objects: dict[str, list[tuple[Thing, tuple[np.ndarray, ...]]]] = {}
         self._object: str | None = None
-        self._active = True  # whether transforms hold at the start of the exposure
         self._imports: list[tuple[int, State]] = []
 
     def run(self) -> Read:
@@ -125,7 +124,7 @@ class Directives:
                 raise
             what = error.what if isinstance(error, SceneError) else "a transform without an inverse"
             raise SceneError(what, token.where) from None
-        if self._active:
+        if self.state.starting:
             self.state = replace(self.state, ctm=ctm)
         else:
             self.read.moving = self.read.moving or token.where
@@ -167,7 +166,7 @@ class Directives:
         which = self.tokens.next()
         if which is None or which.text not in ("StartTime", "EndTime", "All"):
             raise SceneError("ActiveTransform takes StartTime, EndTime or All", token.where)
-        self._active = which.text != "EndTime"
+        self.state = replace(self.state, starting=which.text != "EndTime")
 
     # -- blocks --------------------------------------------------------------------------------------
 
@@ -175,19 +174,14 @@ class Directives:
         """AttributeBegin, TransformBegin."""
         self._push(token)
 
-    def attribute_end(self, token: Token) -> None:
-        """Everything as it was."""
+    def end(self, token: Token) -> None:
+        """AttributeEnd, and TransformEnd, which PBRT-v4 takes for it: everything as it was."""
         self.state = self._pop(token)
-
-    def transform_end(self, token: Token) -> None:
-        """The transform as it was."""
-        self.state = replace(self.state, ctm=self._pop(token).ctm)
 
     def world_begin(self, token: Token) -> None:
         """What follows is the scene, in world space."""
-        self.state = replace(self.state, ctm=np.eye(4))
+        self.state = replace(self.state, ctm=np.eye(4), starting=True)
         self._systems[_WORLD] = np.eye(4)
-        self._active = True
 
     def object_begin(self, token: Token) -> None:
         """What follows is a template that stands nowhere yet."""
@@ -341,8 +335,7 @@ _HANDLERS: dict[str, Handler] = {
     "CoordinateSystem": Directives.coordinate_system,
     "ActiveTransform": Directives.active_transform,
     "TransformTimes": Directives.skip_numbers,
-    "AttributeEnd": Directives.attribute_end,
-    "TransformEnd": Directives.transform_end,
+    **dict.fromkeys(("AttributeEnd", "TransformEnd"), Directives.end),
     "WorldBegin": Directives.world_begin,
     "ObjectBegin": Directives.object_begin,
     "ObjectEnd": Directives.object_end,

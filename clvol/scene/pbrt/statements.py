@@ -21,6 +21,7 @@ class State:
     inside: str = ""
     outside: str = ""
     space: str = "srgb"
+    starting: bool = True  # whether transforms are for the exposure's start
     defaults: tuple[tuple[str, Parameter], ...] = ()  # of `Attribute`, by what they are for
 
 
