@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING
 
+from clvol.base.arguments import flag
 from clvol.errors import OptionError, shown
 from clvol.volumes.level_set import USES, fog_of
 from clvol.volumes.read import read_volume
 from clvol.volumes.repair import sanitized, warn_of
 
 if TYPE_CHECKING:
-    import os
-
     from clvol.volumes.grid import DenseGrid, SparseGrid
 
 
@@ -43,8 +43,13 @@ def load_volume(
     VolumeError
         The file is missing, damaged, or of no use.
     OptionError
-        Another `level_set`, or the package that reads the format is missing.
+        What is no file's name, another `level_set`, or the package that reads the format is missing.
     """
+    try:
+        path = os.fsdecode(path)
+    except TypeError:
+        raise OptionError(f"load_volume takes a file's name, not {shown(path)}") from None
+    sanitize = flag("sanitize", sanitize)
     if level_set not in (None, *USES):
         raise OptionError(f"level_set cannot be {shown(level_set)}", hint=f"supported: {', '.join(USES)}")
     read = read_volume(path, grid)

@@ -9,7 +9,7 @@ from places import CASES
 from vdb_writer import GridSpec, write_vdb
 
 import clvol
-from clvol.errors import VolumeError
+from clvol.errors import OptionError, VolumeError
 from clvol.volumes import check_coefficients, dense_from_array, write_vol
 from clvol.volumes.repair import sanitized
 
@@ -128,6 +128,19 @@ def test_what_is_whole_is_returned_as_it_is(caplog):
 def test_what_openvdb_wrote_with_nan_in_it_can_be_rendered():
     read = clvol.load_volume(CASES / "vdb" / "nan.vdb", sanitize=True)
     check_coefficients(read)
+
+
+@pytest.mark.parametrize(
+    ("given", "options", "told"),
+    [
+        (None, {}, "load_volume takes a file's name, not None"),
+        (3, {}, "load_volume takes a file's name, not 3"),
+        ("a.npy", {"sanitize": "yes"}, "sanitize='yes' is neither True nor False"),
+    ],
+)
+def test_what_load_volume_cannot_take_is_told(given, options, told):
+    with pytest.raises(OptionError, match=told):
+        clvol.load_volume(given, **options)
 
 
 def test_media_that_share_a_volume_still_do():
