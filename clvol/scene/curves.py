@@ -27,6 +27,8 @@ TOLERANCE = 0.01
 MOST_STEPS = 64
 """Most steps along a piece of a spline."""
 _BYTES_A_TRIANGLE = 200
+_ROUNDING = 1e-9
+"""Of a spline's derivatives."""
 _SLANTED = 0.1
 """Squared sine between a curve and an axis beyond which frames may follow the axis."""
 _BASIS = np.array([[1, 4, 1, 0], [-3, 0, 3, 0], [3, -6, 3, 0], [-1, 3, -3, 1]]) / 6
@@ -95,10 +97,30 @@ def _splines(curves: Sequence[np.ndarray]) -> RawMesh:
         t = np.append((np.arange(len(piece) - 1) - start) / count[piece[:-1]], 1.0)
         powers = np.einsum("ij,pjk->pik", _BASIS, pieces)[piece]
         values = ((powers[:, 3] * t[:, None] + powers[:, 2]) * t[:, None] + powers[:, 1]) * t[:, None]
-        slopes = (3 * powers[:, 3] * t[:, None] + 2 * powers[:, 2]) * t[:, None] + powers[:, 1]
-        tubes.append(_tube(values + powers[:, 0], slopes, (first + piece + t) / total))
+        tubes.append(_tube(values + powers[:, 0], _slopes(powers, t), (first + piece + t) / total))
         first += len(pieces)
     return _joined(tubes)
+
+
+def _slopes(powers: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Which way a spline goes on at `t` of pieces by powers of t, both of one length; the last is its end.
+
+    Where its slope is 0, as where three control points are one, that is the first of the higher derivatives
+    that is not: there the curve sets off along it, and at the end arrives against or along it.
+    """
+    t = t[:, None]
+    second, third = 6 * powers[:, 3] * t + 2 * powers[:, 2], 6 * powers[:, 3]
+    slopes: np.ndarray = (3 * powers[:, 3] * t + 2 * powers[:, 2]) * t + powers[:, 1]
+    arriving = np.where(np.arange(len(t)) < len(t) - 1, 1.0, -1.0)[:, None]
+    sizes = np.abs(powers[:, :, :3]).max(axis=2)
+    nothing = np.maximum(_ROUNDING * sizes[:, 1:].max(axis=1), 1e-14 * sizes[:, 0])
+    for derivative in (arriving * second, third):
+        still = np.linalg.norm(slopes[:, :3], axis=1) <= nothing
+        slopes[still] = derivative[still]
+    known = np.flatnonzero(np.linalg.norm(slopes[:, :3], axis=1) > nothing)
+    if len(known):  # pieces that are a point lie across their neighbours' way
+        slopes = slopes[known[np.searchsorted(known, np.arange(len(t))).clip(max=len(known) - 1)]]
+    return slopes
 
 
 def _steps(pieces: np.ndarray) -> np.ndarray:

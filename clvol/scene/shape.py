@@ -190,6 +190,8 @@ def _meter(reader: Reader, kind: str, to_world: np.ndarray, triangles: Mesh | No
     if not isinstance(made, ShapeMeter):
         reader.fail(f"a shape takes no sensor '{node.type}'", name, "irradiancemeters go into shapes")
     if triangles is not None and triangles.normals is not None:
+        if reader.type.endswith("curve"):
+            reader.unsupported("an irradiancemeter on curves", name)
         what = "an irradiancemeter on a mesh with normals of its vertices"
         reader.unsupported(what, name, "set face_normals, or leave its normals out")
     if kind == "cylinder" and not stays_round(to_world):

@@ -70,6 +70,21 @@ def test_a_tube_is_as_far_from_its_spline_as_that_is_wide(load):
     assert ((normals * away).sum(1) > 0).all()
 
 
+@pytest.mark.parametrize("repeated", [3, 4, 6])
+def test_a_spline_that_is_held_at_its_ends_is_round_there(load, repeated):
+    """Three control points in one place, by which a spline reaches it, leave it no slope there."""
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    along = np.repeat([0.0, 1, 2, 3], [repeated, 1, 1, repeated])
+    points = along[:, None] * turn[0] + (5.0, -3, 7)
+    text = "\n".join(" ".join(map(str, [*point, 0.1])) for point in points)
+    mesh = load(text).mesh
+    vertices = (mesh.vertices.astype(float) + load(text).to_world[:3, 3] - (5, -3, 7)) @ turn.T
+    np.testing.assert_allclose(np.linalg.norm(vertices[:, 1:], axis=1), 0.1, rtol=0.007)
+    assert vertices[:, 0].min() == pytest.approx(0, abs=1e-5)
+    assert vertices[:, 0].max() == pytest.approx(3, abs=1e-5)
+    assert np.abs(mesh.normals @ turn[0]).max() < 1e-5
+
+
 def test_normals_are_those_of_a_surface_that_grows_wider(load):
     """Cones: a half angle whose tangent is the slope of the radius."""
     mesh = load("0 0 0 0.1\n1 0 0 0.2\n2 0 0 0.3\n3 0 0 0.4\n").mesh
@@ -137,6 +152,12 @@ def test_curves_are_seen_from_outside_alone_and_bound_no_medium(load):
     assert isinstance(load(STRAIGHT).bsdf, FrontOnly)
     with pytest.raises(Error, match="curves bound no media"):
         load(STRAIGHT, interior={"type": "homogeneous"})
+
+
+def test_curves_are_no_meters(load):
+    with pytest.raises(Error, match="an irradiancemeter on curves") as told:
+        load(STRAIGHT, meter={"type": "irradiancemeter"})
+    assert "face_normals" not in str(told.value)
 
 
 def test_more_triangles_than_there_is_memory_for_are_refused(load, monkeypatch):
