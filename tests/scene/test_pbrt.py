@@ -84,11 +84,13 @@ def test_a_matrix_is_written_by_columns_and_blocks_restore(load):
     assert places == [[4, 5, 6], [0, 0, 0]]
 
 
-@pytest.mark.parametrize("block", ["Attribute", "Transform"])
-def test_what_blocks_change_ends_with_them(load, block):
+@pytest.mark.parametrize(
+    ("block", "end"), [("Attribute", "Attribute"), ("Transform", "Transform"), ("Transform", "Attribute")]
+)
+def test_what_blocks_change_ends_with_them(load, block, end):
     """The moments that transforms are for too; PBRT-v4 takes Transform blocks for Attribute blocks."""
     inside = 'ActiveTransform EndTime Translate 9 0 0 Material "conductor" ReverseOrientation'
-    scene = load(f'{block}Begin {inside} {block}End Translate 1 2 3 Shape "sphere"')
+    scene = load(f'{block}Begin {inside} {end}End Translate 1 2 3 Shape "sphere"')
     assert scene.shapes[0].to_world[:3, 3] == pytest.approx([1, 2, 3])
     assert type(scene.shapes[0].bsdf).__name__ == "TwoSided"
     assert not scene.shapes[0].flip_normals
@@ -181,6 +183,36 @@ def test_exposure_scales_all_that_emits(load):
         'LightSource "point" "power" 1'.replace('"power"', '"float power"') + ' Shape "sphere"', camera
     )
     assert scene.emitters[0].intensity == pytest.approx((4 / (4 * np.pi),))
+
+
+@pytest.mark.parametrize(
+    ("shutter", "factor"),
+    [
+        ('"float shutterclose" 0.25', 0.25),
+        ('"float shutteropen" 1 "float shutterclose" 4', 3),
+        ('"float shutteropen" 0.5', 0.5),
+    ],
+)
+def test_the_time_that_the_shutter_is_open_is_that_of_the_exposure(load, shutter, factor):
+    """BasicScene::SetOptions of PBRT-v4 takes it from the camera and gives it to the film's sensor."""
+    camera = CAMERA.replace('"float fov" 40', f'"float fov" 40 {shutter}')
+    scene = load('LightSource "infinite" "rgb L" [2 2 2] Shape "sphere"', camera)
+    assert scene.emitters[0].radiance == pytest.approx((2 * factor,))
+
+
+def test_a_shutter_that_does_not_open_is_told(load):
+    camera = CAMERA.replace('"float fov" 40', '"float fov" 40 "float shutterclose" 0')
+    with pytest.raises(clvol.SceneError, match="the shutter does not open"):
+        load('Shape "sphere"', camera)
+
+
+def test_options_are_a_name_and_a_value(load, caplog):
+    options = 'Option "seed" 7 Option "disable-wavelength-jitter" true Option "rendercoordsys" "world"'
+    scene = load('Shape "sphere"', f'{options} Option "disablepixeljitter" true {CAMERA}')
+    assert scene.seed == 7
+    assert "not in their middles" in caplog.text
+    with pytest.raises(clvol.SceneError, match="'forcediffuse', by which every surface is diffuse"):
+        load('Shape "sphere"', f'Option "forcediffuse" true {CAMERA}')
 
 
 def test_parallel_light_travels_from_from_to_to(load):
@@ -318,6 +350,11 @@ def test_what_cannot_be_rendered_is_told_at_once(load):
         ('Include "scene.pbrt"', "includes itself"),
         ("AttributeBegin", "without its end"),
         ("AttributeEnd", "without its AttributeBegin"),
+        ('Camera "perspective"', "Camera after WorldBegin"),
+        ("WorldBegin", "a second WorldBegin"),
+        ('Option "disablepixeljiter" true', "did you mean 'disablepixeljitter'"),
+        ('Option "seed" "a"', "'seed' is a whole number"),
+        ('Option "wavefront" 1', "'wavefront' is true or false"),
         ('Shape "trianglemesh" "point3 P" [0 0 0 1 0 0 0 1 0] "integer indices" [0 1 9]', "vertex 9 of 3"),
         (
             'Texture "t" "float" "scale" "texture tex" "t" Shape "sphere" "texture alpha" "t"',
@@ -339,6 +376,12 @@ def test_a_mark_of_the_byte_order_is_no_statement(tmp_path):
     path = tmp_path / "scene.pbrt"
     path.write_text(f'{CAMERA} WorldBegin Shape "sphere"', encoding="utf-8-sig")
     assert len(clvol.load_file(path).shapes) == 1
+
+
+@pytest.mark.parametrize("statement", ['Shape "sphere"', 'LightSource "infinite"', "AttributeBegin"])
+def test_the_world_does_not_begin_before_it_does(load, statement):
+    with pytest.raises(clvol.SceneError, match=f"{statement.split()[0]} before WorldBegin"):
+        load("", f"{CAMERA} {statement}")
 
 
 @pytest.mark.parametrize("text", ["", "# nothing\n", CAMERA])

@@ -81,7 +81,7 @@ class Pictures:
         if thing.type not in ("perspective", "orthographic"):
             hint = "supported: perspective, orthographic"
             parameters.refuse(f"the camera '{thing.type[:60]}'", hint=hint)
-        parameters.ignore("shutteropen", "shutterclose")
+        parameters.ignore("shutteropen", "shutterclose")  # see _sensor_response
         if np.linalg.cond(thing.state.ctm[:3, :3]) > 1e9:
             parameters.fail("the camera's transform flattens space")
         from_camera = np.linalg.inv(thing.state.ctm)
@@ -146,7 +146,7 @@ class Pictures:
         if thing.type == "stratified":
             count = parameters.integer("xsamples", 4, 1) * parameters.integer("ysamples", 4, 1)
         parameters.ignore("randomization", "jitter")
-        seed = parameters.integer("seed", 0, 0)
+        seed = parameters.integer("seed", self.context.read.seed, 0)
         parameters.finish()
         if thing.type != "independent" and "Sampler" in self.context.read.options:
             self.context.say(
@@ -181,7 +181,10 @@ class Pictures:
         return film, (width, height)
 
     def _sensor_response(self, thing: Thing, parameters: Parameters) -> None:
-        """`iso` and `exposuretime` multiply the picture; all sensors are the standard observer."""
+        """`iso` and the time of exposure multiply the picture; all sensors are the standard observer.
+
+        That time is the camera's; films of early versions have it themselves.
+        """
         sensor = parameters.string("sensor", "cie1931")
         if sensor != "cie1931":
             self.context.say(
@@ -189,8 +192,12 @@ class Pictures:
             )
         if parameters.number("whitebalance", 0.0):
             self.context.say("'whitebalance' of the film is left out", parameters.place("whitebalance"))
-        time, iso = parameters.number("exposuretime", 1.0, 0.0), parameters.number("iso", 100.0, 0.0)
-        self.context.exposure = time * iso / 100
+        camera = self._thing("Camera", "perspective")[1]
+        opened, closed = camera.number("shutteropen", 0.0), camera.number("shutterclose", 1.0)
+        if opened >= closed:
+            camera.fail("the shutter does not open", camera.place("shutterclose"))
+        time = parameters.number("exposuretime", closed - opened, 0.0)
+        self.context.exposure = time * parameters.number("iso", 100.0, 0.0) / 100
 
     def _crop(self, parameters: Parameters, width: int, height: int) -> tuple[int, int, int, int] | None:
         window, bounds = parameters.floats("cropwindow"), parameters.integers("pixelbounds")

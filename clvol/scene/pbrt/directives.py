@@ -11,6 +11,7 @@ import numpy as np
 from clvol.errors import SceneError, shortened
 from clvol.scene.lookup import find
 from clvol.scene.pbrt.colours import SPACES
+from clvol.scene.pbrt.options import take_option
 from clvol.scene.pbrt.parameters import read_parameters
 from clvol.scene.pbrt.statements import Read, State, Thing
 from clvol.scene.pbrt.tokens import Token, Tokens
@@ -22,9 +23,16 @@ if TYPE_CHECKING:
 
 MAX_STACK = 10_000
 MAX_SHAPES = 1_000_000
-_WORLD = "world"
+_WORLD, _BEGINS = "world", "WorldBegin"
+_BLOCKS = ("AttributeBegin", "TransformBegin")
 _TARGETS = ("shape", "light", "material", "medium", "texture")
 _OPTIONS = ("Camera", "Film", "Sampler", "Integrator", "PixelFilter", "Accelerator")
+_BEFORE_THE_WORLD = (*_OPTIONS, "TransformTimes", "WorldBegin")
+_ANYWHERE = (
+    *("LookAt", "Rotate", "Scale", "Translate", "Transform", "ConcatTransform", "Identity"),
+    *("CoordinateSystem", "CoordSysTransform", "ActiveTransform", "ColorSpace", "Attribute"),
+    *("MediumInterface", "MakeNamedMedium", "Option", "Include"),
+)
 
 
 class Directives:
@@ -61,6 +69,7 @@ class Directives:
             if handler is None:
                 hint = join_hints(did_you_mean(token.text, _HANDLERS), f"supported: {listed(_HANDLERS)}")
                 raise SceneError(f"unknown statement '{shortened(token.text, 60)}'", token.where, hint)
+            self._check_place(token)
             handler(self, token)
         if self._stack:
             raise SceneError(f"{self._stack[-1][0]} without its end", self._stack[-1][2])
@@ -71,6 +80,17 @@ class Directives:
                 "a scene without WorldBegin", self.tokens.end, "the file is empty, or was cut short"
             )
         return self.read
+
+    def _check_place(self, token: Token) -> None:
+        """SceneError for what stands on the wrong side of WorldBegin: pbrt refuses it."""
+        if token.text in _ANYWHERE:
+            return
+        begun = _WORLD in self._systems
+        if begun and token.text in _BEFORE_THE_WORLD:
+            what = "a second WorldBegin" if token.text == _BEGINS else f"{token.text} after {_BEGINS}"
+            raise SceneError(what, token.where, f"it stands before {_BEGINS}, with the camera's transform")
+        if not begun and token.text not in _BEFORE_THE_WORLD:
+            raise SceneError(f"{token.text} before {_BEGINS}", token.where, "it is of the world")
 
     # -- pieces --------------------------------------------------------------------------------------
 
@@ -105,8 +125,9 @@ class Directives:
         self._stack.append((token.text, self.state, token.where))
 
     def _pop(self, token: Token) -> State:
-        begin = token.text.replace("End", "Begin")
-        if not self._stack or self._stack[-1][0] != begin:
+        begins = ("ObjectBegin",) if token.text == "ObjectEnd" else _BLOCKS
+        if not self._stack or self._stack[-1][0] not in begins:
+            begin = token.text.replace("End", "Begin")
             raise SceneError(f"{token.text} without its {begin}", token.where)
         return self._stack.pop()[1]
 
@@ -316,8 +337,9 @@ class Directives:
         self.tokens.include(path, token.where)
 
     def set_option(self, token: Token) -> None:
-        """Options of pbrt's own work."""
-        read_parameters(self.tokens)
+        """Option: a name and a value."""
+        name = self.text(token)
+        take_option(self.read, name, self.tokens.next(), token.where)
 
     def skip_numbers(self, token: Token) -> None:
         """TransformTimes."""
@@ -329,7 +351,7 @@ _HANDLERS: dict[str, Handler] = {
     **dict.fromkeys(_OPTIONS, Directives.option),
     **dict.fromkeys(("LookAt", "Rotate", "Scale", "Translate", "Transform"), Directives.transform),
     **dict.fromkeys(("ConcatTransform", "Identity", "CoordSysTransform"), Directives.transform),
-    **dict.fromkeys(("AttributeBegin", "TransformBegin"), Directives.begin),
+    **dict.fromkeys(_BLOCKS, Directives.begin),
     **dict.fromkeys(("Include", "Import"), Directives.include),
     **dict.fromkeys(("MakeNamedMaterial", "MakeNamedMedium"), Directives.make_named),
     "CoordinateSystem": Directives.coordinate_system,

@@ -54,4 +54,6 @@ class Read:
     materials: dict[str, Thing] = field(default_factory=dict)
     media: dict[str, Thing] = field(default_factory=dict)
     textures: dict[tuple[str, str], Thing] = field(default_factory=dict)  # by "float" or "spectrum", and name
+    seed: int = 0  # of samplers that say none
+    said: list[tuple[str, str]] = field(default_factory=list)  # what is taken as something else, and where
     moving: str = ""  # where the first transform was left out that holds at the end of the exposure alone

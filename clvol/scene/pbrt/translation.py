@@ -56,6 +56,8 @@ def read_pbrt(path: Path, keywords: Mapping[str, object], faults: Faults) -> Nod
     directives = Directives(path)
     read = directives.run()
     context = Context(read, directives.folders, str(path), faults)
+    for said, where in read.said:
+        context.say(said, where)
     if read.moving:
         context.say("motion is left out: transforms are those of the exposure's start", read.moving)
     _Translation(context).run()
