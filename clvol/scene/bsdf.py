@@ -25,6 +25,7 @@ from clvol.scene.materials import (
     TwoSided,
 )
 from clvol.scene.refraction import COMMON_NAMES, INDICES, METALS
+from clvol.scene.sampling_rates import sheet_leaves_out, solid_leaves_out
 from clvol.scene.sides import MAX_PARTS, count_parts
 from clvol.scene.texture import constant, roughness, share, texture
 from clvol.scene.vocabulary import close_ones, join_hints, listed
@@ -33,6 +34,12 @@ if TYPE_CHECKING:
     from clvol.scene.reader import Reader
 
 DISTRIBUTIONS = ("beckmann", "ggx")
+_SHEET_RATES = tuple(
+    f"{lobe}_{way}_sampling_rate"
+    for way in ("reflectance", "transmittance")
+    for lobe in ("specular", "diffuse")
+)
+_LEFT_OUT = "0, as given: light that no other lobe's samples find is left out, as in Mitsuba"
 MOST_SPECULAR = 12.0
 """Below 1 / 0.08, where a dielectric would reflect all."""
 
@@ -110,7 +117,7 @@ def principled(reader: Reader) -> Principled:
         eta = 2 / (1 - math.sqrt(0.08 * specular)) - 1
     elif transmits != (0.0,) and eta == 1:
         eta = 1.001
-    return Principled(
+    made = Principled(
         **_principled(reader),
         metallic=_share(reader, "metallic"),
         clearcoat=_share(reader, "clearcoat"),
@@ -120,11 +127,14 @@ def principled(reader: Reader) -> Principled:
         specular_rate=_rate(reader, "main_specular"),
         clearcoat_rate=_rate(reader, "clearcoat"),
     )
+    if solid_leaves_out(made):
+        reader.approximated(_LEFT_OUT, "main_specular_sampling_rate")
+    return made
 
 
 def principledthin(reader: Reader) -> PrincipledThin:
     """The `principledthin` plugin."""
-    return PrincipledThin(
+    made = PrincipledThin(
         **_principled(reader),
         spec_trans=_share(reader, "spec_trans"),
         eta=texture(reader, "eta", 1.5, maximum=math.inf),
@@ -133,6 +143,10 @@ def principledthin(reader: Reader) -> PrincipledThin:
         specular_transmittance_rate=_rate(reader, "specular_transmittance"),
         diffuse_transmittance_rate=_rate(reader, "diffuse_transmittance"),
     )
+    if sheet_leaves_out(made):
+        zero = [name for name in _SHEET_RATES if reader.number(name, 1.0) == 0]
+        reader.approximated(_LEFT_OUT, zero[0])
+    return made
 
 
 def _principled(reader: Reader) -> dict[str, Any]:
