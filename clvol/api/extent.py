@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import operator
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from clvol.api.sharing import check_spread, is_spread
-from clvol.base.arguments import check_seed, positive
+from clvol.base.arguments import check_seed, index, positive
 from clvol.errors import OptionError, either, option, shown
 from clvol.planning import registry
 from clvol.planning.choices import Choices
@@ -113,7 +112,7 @@ def sample_range(
     else:
         first, count = 0, usual if spp is None else spp
     try:
-        first, count = operator.index(first), operator.index(count)
+        first, count = index(first), index(count)
     except TypeError:
         given = f"not {shown(first)} and {shown(count)}"
         raise OptionError("numbers of samples must be whole", hint=given) from None

@@ -29,10 +29,17 @@ def positive(name: str, value: object, unit: str = "") -> float:
     return number
 
 
+def index(value: Any) -> int:
+    """`value` as an int, if it is an integer of any kind; TypeError otherwise, and for True and False."""
+    if isinstance(value, bool):
+        raise TypeError
+    return operator.index(value)
+
+
 def whole(name: str, value: Any) -> int:
     """`value` if it is an integer of any kind; OptionError otherwise."""
     try:
-        return operator.index(value)
+        return index(value)
     except TypeError:
         raise OptionError(f"{name}={shown(value)} is not a whole number") from None
 
@@ -55,7 +62,7 @@ def listed(value: Any) -> list[Any] | None:
 def check_seed(seed: Any) -> int:
     """`seed` if it is a 64-bit number; OptionError otherwise."""
     try:
-        number = operator.index(seed)
+        number = index(seed)
     except TypeError:
         number = -1
     if not 0 <= number <= MOST_SEED:

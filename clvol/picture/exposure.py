@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from clvol.errors import OptionError, shown
@@ -24,7 +26,8 @@ def check_exposure(exposure: float | str) -> None:
     """OptionError for what is neither "auto" nor a number of stops up to `MOST_STOPS`, either way."""
     if isinstance(exposure, str) and exposure == AUTO:
         return
-    if not (isinstance(exposure, int | float | np.number) and abs(exposure) <= MOST_STOPS):
+    number = math.nan if isinstance(exposure, bool) else exposure
+    if not (isinstance(number, int | float | np.number) and abs(number) <= MOST_STOPS):
         raise OptionError(
             f"exposure {shown(exposure)} is not a number from {-MOST_STOPS:g} to {MOST_STOPS:g} stops",
             hint=f"or '{AUTO}'",

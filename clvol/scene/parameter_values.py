@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from clvol.base.arguments import index
 from clvol.base.masks import as_array, masked_count
 from clvol.errors import SceneError, shown
 from clvol.scene import records
@@ -149,7 +149,7 @@ def pair(least: int) -> Check:
 
     def check(value: Any, name: str) -> tuple[int, int]:
         try:
-            x, y = map(operator.index, value)
+            x, y = map(index, value)
         except (TypeError, ValueError):
             raise _wrong(name, "two whole numbers", value) from None
         if min(x, y) < least:

@@ -199,7 +199,10 @@ def check_size(matrix: np.ndarray) -> None:
 def _numbers(value: ArrayLike) -> np.ndarray:
     """A float64 copy, NaN where elements are masked; empty where there are no numbers."""
     try:
-        return np.ma.filled(np.ma.array(as_array(value), np.float64, copy=True), np.nan)
+        array = as_array(value)
+        if array.dtype == bool:
+            return np.empty(0)
+        return np.ma.filled(np.ma.array(array, np.float64, copy=True), np.nan)
     except (TypeError, ValueError, OverflowError):
         return np.empty(0)
 
@@ -215,7 +218,7 @@ def _vector(value: ArrayLike, what: str) -> np.ndarray:
 
 def _number(value: float, what: str) -> float:
     try:
-        number = float(value)
+        number = np.nan if isinstance(value, bool | np.bool_) else float(value)
     except (TypeError, ValueError, OverflowError):
         number = np.nan
     if not np.isfinite(number):

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
+from clvol.base.arguments import index
 from clvol.errors import OptionError, SceneError, shown
 from clvol.scene.loader import load_sensor
 from clvol.scene.parameters import sensor_with
@@ -52,7 +52,7 @@ def seen_by(scene: Scene, sensor: View) -> Scene:
         )
     sensors = all_sensors(scene)
     try:
-        number = operator.index(sensor)
+        number = index(sensor)
     except TypeError:
         hint = "give the number of one of the scene's sensors, or a dict"
         raise OptionError(f"sensor must be a number or a dict, not {shown(sensor)}", hint=hint) from None
@@ -136,7 +136,7 @@ def before(scene: Scene, background: str | Spectrum) -> Scene:
 def check_size(size: tuple[int, int]) -> tuple[int, int]:
     """Width and height of a film; OptionError where there can be none of that size."""
     try:
-        width, height = map(operator.index, size)
+        width, height = map(index, size)
     except (TypeError, ValueError):
         raise OptionError(
             f"size must be two whole numbers, not {shown(size)}", hint="as (640, 480)"

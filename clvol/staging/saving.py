@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from clvol.base.output_files import StrPath
     from clvol.staging.stage import Staged
 
+_ELSEWHERE = "give the scene another name, or --overwrite"
+
 
 def check_scene(path: StrPath, volume: StrPath) -> None:
     """Raise OptionError now for a scene's file that could not be written or would replace the volume."""
@@ -36,7 +38,7 @@ def save_scene(staged: Staged, path: StrPath, overwrite: bool = False) -> list[s
 
     Parameters
     ----------
-    overwrite : an environment that is there already, and is another one, is replaced.
+    overwrite : a scene or an environment that is there already, and is another one, is replaced.
 
     OptionError where a file cannot be written, or would replace what the scene is read from.
     """
@@ -48,14 +50,16 @@ def save_scene(staged: Staged, path: StrPath, overwrite: bool = False) -> list[s
         beside[file] = encode_exr(split_channels("", array), {})
         if not overwrite and os.path.lexists(file) and not _holds(file, array):
             what = "is there already, and is another light than this scene's"
-            raise OptionError(what, str(file), "give the scene another name, or --overwrite")
+            raise OptionError(what, str(file), _ELSEWHERE)
         return file.name
 
     comment = "\n     ".join([f"The scene that clvol makes of {staged.source.name}.", *staged.lines])
-    xml = scene_xml(_moved(staged.description, target.parent), attach, comment)
+    xml = scene_xml(_moved(staged.description, target.parent), attach, comment).encode()
+    if not overwrite and os.path.lexists(target) and not (target.is_file() and target.read_bytes() == xml):
+        raise OptionError("is there already, and is another scene, or was edited", str(target), _ELSEWHERE)
     for file in (target, *beside):
         check_spares(file, staged.source.files)
-    for file, data in (beside | {target: xml.encode()}).items():
+    for file, data in (beside | {target: xml}).items():
         write_file(file, data)
     return [str(target), *map(str, beside)]
 

@@ -133,7 +133,7 @@ def choose_majorants(matter: Matter, volumes: Sequence[PreparedVolume], needs: M
     for one, candidate in zip(walked, best, strict=True):
         tables[one.number] = _tables(candidate, chosen, needs, _longest(one))
     weighed = tuple(costs.items()) if needs.majorant == "auto" else ()
-    dense = (_worst(one, bounds[_density(matter, one)]) for one in walked)
+    dense = (_worst(one, bounds[_density(matter, one)], needs.scale) for one in walked)
     return Majorants(chosen, weighed, tuple(tables), tuple(filter(None, dense)))
 
 
@@ -162,16 +162,16 @@ def _check_range(one: _Walked, needs: MajorantNeeds) -> None:
         )
 
 
-def _worst(one: _Walked, bounds: AnyBounds) -> Worst | None:
+def _worst(one: _Walked, bounds: AnyBounds, scale: float) -> Worst | None:
     """Where a medium's walks have the most steps; None of one that is not that thick, whatever its cells."""
     transfer = one.medium.transfer("sigma_t")
     peak = one.volume.peak(transfer)
-    if float(np.max(_longest(one) * peak)) < MANY_STEPS:
+    if scale * float(np.max(_longest(one) * peak)) < MANY_STEPS:
         return None
     rate = float(np.max(one.medium.scale))
-    steps = worst_cell(bounds, one.volume.voxel * bounds.cell_size, rate)
+    steps = worst_cell(bounds, one.volume.voxel * bounds.cell_size, rate, scale)
     where = one.volume.volume.source or one.medium.name
-    return Worst(where, rate * float(np.max(peak)), steps, transfer is not None)
+    return Worst(where, rate * float(np.max(peak)), steps, transfer is not None, scale)
 
 
 def _bounds(volume: PreparedVolume, needs: MajorantNeeds, transfer: Transfer | None) -> AnyBounds:

@@ -84,7 +84,7 @@ def prepare(scene: Scene, plan: Plan | None = None) -> PreparedScene:
         A coefficient is too large for a float, a volume is wrapped as none can be, a medium is too thin for
         places in it, or the camera is not in the medium that it is said to be in.
     OptionError
-        The marching step is too fine.
+        The marching step is too fine, or bounds are multiplied by so much that no walk ends.
     """
     plan = plan or Plan.of(scene)
     kept: _Kept | None = scene.kept.get(__name__)

@@ -47,6 +47,19 @@ def test_what_walks_cannot_do_is_refused_and_exact_flights_do_it() -> None:
         clvol.show(RAMP, transfer={"opacity": opacity}, size=(4, 4), spp=1)
 
 
+def test_bounds_multiplied_beyond_that_are_refused_and_their_scale_is_to_blame(caplog) -> None:
+    for choices in ({}, {"majorant": "kdtree", "technique": "spectral"}):
+        with pytest.raises(
+            clvol.OptionError, match=r"majorant_scale=1e\+30 makes .* given up after .* quick"
+        ):
+            clvol.render(scene(10), majorant_scale=1e30, **choices)
+    clvol.plan(scene(10), majorant_scale=1e30, technique="regular", transmittance="regular")
+    clvol.render(scene(10), majorant_scale=1e3)
+    assert not caplog.records
+    clvol.render(scene(10), majorant_scale=3e6, technique="delta")
+    assert "majorant_scale=3000000.0 makes" in str(caplog.records[0].message)
+
+
 def test_what_takes_long_is_said_and_rendered(caplog: pytest.LogCaptureFixture) -> None:
     clvol.render(scene(1e7), technique="delta")
     assert "tentative collisions; " in caplog.text

@@ -119,14 +119,19 @@ def test_results_replace_no_file_of_their_scene(folder: Path) -> None:
 
 
 def test_a_scene_does_not_replace_what_lies_beside_it(folder: Path) -> None:
-    """But the light that it had before; and --overwrite says otherwise."""
+    """Nor a scene of that name, but itself and the light that it had before; --overwrite says otherwise."""
     runner = CliRunner()
     command = ["scene", "fog.vol", "-o", "a.xml", "--light"]
     assert runner.invoke(main, [*command, "sun"]).exit_code == 0
-    assert runner.invoke(main, [*command, "sun", "--spp", "3"]).exit_code == 0
+    assert runner.invoke(main, [*command, "sun"]).exit_code == 0, "the same again"
     light, text = (folder / "a_environment.exr").read_bytes(), (folder / "a.xml").read_text()
+    assert "a.xml: is there already" in refused(*command, "sun", "--spp", "3")
     assert "a_environment.exr: is there already" in refused(*command, "studio")
     assert (folder / "a_environment.exr").read_bytes() == light and (folder / "a.xml").read_text() == text
     done = runner.invoke(main, [*command, "studio", "--overwrite"])
     assert done.exit_code == 0 and "a_environment.exr" in done.output
     assert (folder / "a_environment.exr").read_bytes() != light
+    edited = text.replace("<scene", "<!-- mine --><scene")
+    (folder / "a.xml").write_text(edited)
+    assert "or was edited; give the scene another name, or --overwrite" in refused(*command, "studio")
+    assert (folder / "a.xml").read_text() == edited

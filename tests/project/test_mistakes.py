@@ -37,6 +37,7 @@ WRONG = {
     "object": Unspeakable(),
     "complex": 1j,
 }
+COUNTS = ("spp", "seed", "samples", "size", "sensor", "pool")
 TAKING_ONE = ["load_file", "load_dict", "load_string", "load_result", "merge", "traverse", "plan", "info"]
 VECTORS = {
     "look_at": [(0, 0, 1), (0, 0, 0), (0, 1, 0)],
@@ -82,6 +83,30 @@ def test_a_wrong_vector(name: str, value: str) -> None:
 def test_a_wrong_option_of_a_render(scene: clvol.Scene, name: str, value: str, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)  # some values are names that a checkpoint may have
     call(clvol.render, scene, **{"spp": 1, "pool": 256, name: WRONG[value]})
+
+
+@pytest.mark.parametrize("value", [True, np.True_])
+def test_true_is_no_number(scene: clvol.Scene, result: clvol.Result, value: bool) -> None:
+    """Python counts it as 1: that it is given is a mistake."""
+    for name in (*COUNTS, "majorant_scale", "step", "time_limit", "target_error"):
+        pair = {"samples": (0, value), "size": (value, 4)}
+        with pytest.raises(clvol.Error, match="True"):
+            clvol.render(scene, **{name: pair.get(name, value)})
+    for function, options in (
+        (clvol.selftest, {"seed": value}),
+        (clvol.selftest, {"spp": value}),
+        (clvol.compare, {"rounds": value}),
+        (clvol.progressive, {"interval": value}),
+        (clvol.trace_ray, {"x": value, "y": 0}),
+        (clvol.trace_ray, {"x": 0, "y": 0, "channel": value}),
+    ):
+        with pytest.raises(clvol.Error, match="True"):
+            function(scene, **options)
+    for move in (clvol.scale, clvol.translate, lambda angle: clvol.rotate((0, 0, 1), angle)):
+        with pytest.raises(clvol.SceneError, match="True"):
+            move(value)
+    with pytest.raises(clvol.OptionError, match="True"):
+        result.encode(".png", exposure=value)
 
 
 @pytest.mark.parametrize("value", WRONG)

@@ -101,6 +101,8 @@ def trace_ray(
     x, y, walks, many = (whole(*given) for given in (("x", x), ("y", y), ("walks", walks), ("many", many)))
     if not 1 <= walks <= MOST_SHOWN or not max(walks, 2) <= many <= 1 << 24:
         raise OptionError(f"cannot show {walks} of {many} walks", hint=f"show 1 to {MOST_SHOWN}")
+    if channel is not None and whole("channel", channel) not in range(3):
+        raise OptionError(f"no channel {shown(channel)}", hint="0, 1 and 2 are red, green and blue")
     known = {*registry.FAMILIES, "majorant_scale", "step"} - {"technique", "transmittance"}
     unknown = set(choices) - known
     if unknown:
@@ -201,8 +203,6 @@ def _channel(sigma_t: np.ndarray, channel: int | None) -> int:
     """The channel asked for, else the one attenuated most."""
     if channel is None or len(sigma_t) == 1:
         return int(sigma_t.sum(axis=1, dtype=np.float64).argmax())
-    if channel not in range(3):
-        raise OptionError(f"no channel {shown(channel)}", hint="0, 1 and 2 are red, green and blue")
     return channel
 
 
