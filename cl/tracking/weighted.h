@@ -24,10 +24,10 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
         if (!(real + null > 0.0f))
             break; /* no weight is left in any channel */
         if (choose_event(k.x, real, null)) {
-            collision->beta = beta * (sigma_t / majorant) * ((real + null) / real);
+            collision->beta = beta * event_weight(sigma_t, real, real + null, majorant);
             return real_collision(t, tally, collision);
         }
-        beta *= (sigma_n / majorant) * ((real + null) / null);
+        beta *= event_weight(sigma_n, null, real + null, majorant);
         tally->weight = max_of(tally->weight, spectrum_max(beta));
         RECORD_NULL(beta, tally);
         flight.depth = exponential_variate(k.y);

@@ -21,25 +21,31 @@ INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Ta
         if (!(part + rest > 0.0f))
             break; /* no weight is left in any channel */
         if (choose_event(k.x, part, rest)) {
-            collision->beta = beta * (control / majorant) * ((part + rest) / part);
+            collision->beta = beta * event_weight(control, part, part + rest, majorant);
             collect_emission(in, t, collision->beta, collision);
             return real_collision(t, tally, collision);
         }
         const Extinction sigma_t = segment_extinction(in, &flight.segment, stream, tally);
         const Extinction sigma_r = sigma_t - control, sigma_n = majorant - sigma_t;
         tally->violations += extinction_max(sigma_t) > majorant ? 1 : 0;
+#if CLVOL_EXTINCTION == 3
+        const float of = majorant;
         beta *= (part + rest) / rest;
-        collect_emission(in, t, beta * (sigma_r / majorant), collision);
+#else /* the same in two factors, each of which is 1 within the bounds */
+        const float of = rest;
+        beta *= event_weight(rest, rest, part + rest, majorant);
+#endif
+        collect_emission(in, t, beta * (sigma_r / of), collision);
         const float real = event_rate(beta, sigma_r), null = event_rate(beta, sigma_n);
         if (!(real + null > 0.0f)) { /* nothing but the control is here: what is left has no weight */
             collision->beta = (Spectrum)(0.0f);
             return false;
         }
         if (choose_event(k.y, real, null)) {
-            collision->beta = beta * (sigma_r / majorant) * ((real + null) / real);
+            collision->beta = beta * event_weight(sigma_r, real, real + null, of);
             return real_collision(t, tally, collision);
         }
-        beta *= (sigma_n / majorant) * ((real + null) / null);
+        beta *= event_weight(sigma_n, null, real + null, of);
         tally->weight = max_of(tally->weight, spectrum_max(beta));
         RECORD_NULL(beta, tally);
         flight.depth = exponential_variate(stream_pair(stream).x);

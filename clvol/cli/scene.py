@@ -30,7 +30,7 @@ Examples:
 @click.option("--size", type=Size(), metavar="WxH", help="Pixels of the picture, as 640x480.")
 @click.option("--spp", type=click.IntRange(min=1), help="Samples per pixel.")
 @definitions_option
-@click.option("--overwrite", is_flag=True, help="Replace files that are there already and differ.")
+@click.option("--overwrite", is_flag=True, help="Replace files that are there already.")
 @quiet_option
 def scene(
     volume: str,

@@ -7,11 +7,13 @@ import pytest
 from stat_tests import largest_z
 
 import clvol
+from clvol.lab.combinations import unbiased
 from clvol.lab.hard import scenes
 from clvol.lab.hard.block import Block
 from clvol.scene.records import Integrator
 
 EYE, AHEAD = (0.47, 0.52, -2.0), (0.0, 0.0, 1.0)
+LUMPS = 0.2 + 0.8 * np.random.default_rng(4).random((9, 9, 9))
 LAST = 2**32 - 1
 """Samples that a pixel may have."""
 
@@ -60,4 +62,34 @@ def test_a_path_of_many_scatterings_keeps_its_energy(kind, thickness, scattering
     result = clvol.render(made, spp=16, technique="delta", transmittance="none")
     assert result.stats["real_collisions"] / result.stats["paths"] > scatterings
     assert result.image[0, 0, 0] == pytest.approx(1.0, abs=1e-6)
+    assert result.stats["energy_lost_to_caps"] == result.stats["walks_exhausted"] == 0
+
+
+@pytest.mark.parametrize("technique", [name for name in unbiased("technique") if name != "delta"])
+def test_ten_thousand_scatterings_keep_their_energy_by_any_technique(technique):
+    """In a cube of lumps, where these have null collisions, controls and residuals, whose weights are 1."""
+    block = Block(LUMPS, (400.0,), np.eye(4))
+    scene = scenes.furnace([block], (0.5, 0.5, 0.5), AHEAD, albedo=1.0)
+    made = replace(one_pixel(scene), integrator=Integrator())
+    result = clvol.render(made, spp=16, technique=technique, transmittance="none")
+    assert result.stats["real_collisions"] / result.stats["paths"] > 9e3
+    assert result.image[0, 0, 0] == pytest.approx(1.0, abs=1e-6)
+    assert result.stats["energy_lost_to_caps"] == result.stats["walks_exhausted"] == 0
+    assert result.stats["majorant_violations"] == 0
+
+
+@pytest.mark.parametrize("technique", ["spectral", "spectral-decomposition", "regular"])
+def test_coloured_paths_of_many_scatterings_have_bounded_weights(technique):
+    """One path for three channels of 3 : 2 : 1: their weights have a mean of 1, so that none exceeds 3."""
+    block = Block(LUMPS, (300.0, 200.0, 100.0), np.eye(4))
+    scene = scenes.furnace([block], (0.5, 0.5, 0.5), AHEAD, albedo=1.0)
+    made = replace(one_pixel(scene), integrator=Integrator())
+    result = clvol.render(made, spp=16, technique=technique, transmittance="none")
+    print(
+        result.image[0, 0],
+        result.stats["largest_weight"],
+        result.stats["real_collisions"] / result.stats["paths"],
+    )
+    assert result.image[0, 0].mean() == pytest.approx(1.0, abs=1e-4)
+    assert result.stats["largest_weight"] < 3.001
     assert result.stats["energy_lost_to_caps"] == result.stats["walks_exhausted"] == 0

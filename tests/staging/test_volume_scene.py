@@ -241,6 +241,19 @@ def test_a_density_of_0_is_told_from_one_that_is_not_met(caplog: pytest.LogCaptu
     assert "no path met any density: it is 0 everywhere" in caplog.text
 
 
+def test_a_density_that_is_met_without_a_look_up_is_met(caplog: pytest.LogCaptureFixture) -> None:
+    """A control that is all of the density."""
+    fog = {
+        "type": "heterogeneous",
+        "sigma_t": {"type": "gridvolume", "grid": np.ones((4, 4, 4))},
+        "albedo": 1.0,
+    }
+    cube = {"type": "cube", "bsdf": {"type": "null"}, "interior": fog}
+    scene = {"type": "scene", "sensor": {"type": "perspective"}, "sky": {"type": "constant"}, "fog": cube}
+    result = clvol.render(clvol.load_dict(scene), spp=4, size=(8, 8), technique="weighted-decomposition")
+    assert result.stats["lookups"] == 0 and "no path met" not in caplog.text
+
+
 def test_what_is_behind_has_any_colour_or_none() -> None:
     film = clvol.volume_scene(ball(), background="#ff8000").film
     np.testing.assert_allclose(film.backdrop, [1, 0.2158605, 0], atol=1e-6)
