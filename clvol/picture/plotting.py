@@ -47,7 +47,8 @@ def plot(
     from matplotlib.figure import Figure
 
     has_bar = scalar_bar if scalar_bar is not None else bool(scenery and scenery.transfers)
-    if scenery is None and (axes or has_bar or box or scale_bar):
+    wants_length = scale_bar is not None and scale_bar is not False
+    if scenery is None and (axes or has_bar or box or wants_length):
         raise OptionError(
             "the picture knows no volume to label",
             hint="plot the result of a render of one volume; axes=False, box=False shows the picture alone",
@@ -71,7 +72,7 @@ def plot(
         if axes:
             for side in range(3):
                 reach.append(_draw_axis(place, scenery, side, size))
-        if scale_bar:
+        if wants_length:
             _draw_scale_bar(place, scenery, scale_bar, width, height)
         if has_bar and scenery.transfers is not None:
             _draw_colours(figure, scenery.transfers)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from clvol.base.arguments import flag
 from clvol.base.extras import need
 from clvol.base.output_files import check_spares
 from clvol.base.progress import format_noise
@@ -216,10 +217,13 @@ class Result:
         Raises
         ------
         OptionError
-            There is nothing to label, as its scene has not one volume; or matplotlib is missing.
+            There is nothing to label, as its scene has not one volume; an argument is of the wrong kind; or
+            matplotlib is missing.
         """
         from clvol.picture.plotting import plot
 
+        axes, box = flag("axes", axes), flag("box", box)
+        scalar_bar = None if scalar_bar is None else flag("scalar_bar", scalar_bar)
         return plot(self.display, self.scenery, axes, scalar_bar, box, scale_bar)
 
     @property

@@ -62,7 +62,7 @@ def choice(*names: str) -> Value:
     """One of these names."""
 
     def check(name: str, value: Any) -> str:
-        if value in names:
+        if isinstance(value, str) and value in names:
             return str(value)
         close = difflib.get_close_matches(str(value)[:64], names, n=1)
         guess = f"did you mean '{close[0]}'? " if close else ""
@@ -103,7 +103,8 @@ def colour(name: str, value: Any) -> tuple[float, ...]:
 
 def background(name: str, value: Any) -> str | tuple[float, ...]:
     """A colour, or "transparent"."""
-    return TRANSPARENT if value == TRANSPARENT else colour(name, value)
+    transparent = isinstance(value, str) and value == TRANSPARENT
+    return TRANSPARENT if transparent else colour(name, value)
 
 
 def direction(name: str, value: Any) -> tuple[float, ...]:

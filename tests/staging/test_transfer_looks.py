@@ -174,9 +174,12 @@ def test_a_camera_in_the_volume_has_no_endless_axes(shown: clvol.Result) -> None
 
 def test_labels_that_cannot_be_are_refused(shown: clvol.Result, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib", reason="matplotlib is not installed")
-    for wrong in (-1, 1e6, "long", float("nan")):
+    for wrong in (-1, 0, 1e6, "long", float("nan"), np.zeros(2)):
         with pytest.raises(clvol.OptionError):
             shown.plot(scale_bar=wrong)  # type: ignore[arg-type]
+    for name in ("axes", "box", "scalar_bar"):
+        with pytest.raises(clvol.OptionError, match=f"{name}='no' is neither True nor False"):
+            shown.plot(**{name: "no"})  # type: ignore[arg-type]
     bare = replace(shown, scenery=None)
     with pytest.raises(clvol.OptionError, match="knows no volume"):
         bare.plot()

@@ -295,6 +295,7 @@ def test_colours_are_those_of_css(name: str) -> None:
         ("distance", "far"),
         ("density", 3),
         ("emission_scale", True),
+        *((name, np.zeros(2)) for name in ("view", "up", "light", "level_set", "background")),
     ],
 )
 def test_values_that_will_not_do_are_refused(option: str, value: object) -> None:
