@@ -4,20 +4,17 @@
     scene = clvol.load_file("scene.xml", spp=64)
     clvol.render(scene, technique="delta").save("out.exr")
 
-Names are imported when first used, so that `import clvol` and `clvol --help` stay quick.
+Names are imported when first used, so that `import clvol` and `clvol --help` stay quick.  Nothing but the
+version is imported here: until the command has done so, Ctrl-C prints what was being imported (__main__.py).
 """
-
-import signal
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
-from importlib import import_module
-from typing import TYPE_CHECKING
 
 from clvol.version import __version__
 
+TYPE_CHECKING = False
+"""That of `typing`, which those that read the package look for by this name."""
+
 if TYPE_CHECKING:
-    from types import FrameType
+    from types import FrameType, ModuleType
 
     from clvol.api.about import Text, devices, info
     from clvol.api.frames import Frame, Frames, progressive
@@ -162,8 +159,7 @@ if not TYPE_CHECKING:  # who reads it looks the names up above, and finds those 
         """Import a public name when it is first used."""
         if name not in _EXPORTS:
             raise AttributeError(f"module 'clvol' has no attribute {name!r}")
-        with _undisturbed():
-            value = getattr(import_module(_EXPORTS[name]), name)
+        value = getattr(_undisturbed(_EXPORTS[name]), name)
         globals()[name] = value
         return value
 
@@ -172,18 +168,21 @@ if not TYPE_CHECKING:  # who reads it looks the names up above, and finds those 
         return sorted({*__all__, *_EXPORTS})
 
 
-@contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Ctrl-C waits until the block is through: pyopencl ends the process where its import is cut short."""
+def _undisturbed(name: str) -> "ModuleType":
+    """Import a module while Ctrl-C waits: pyopencl ends the process where its import is cut short."""
+    import importlib
+    import signal
+    import threading
+
     previous = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(previous):
-        yield
-        return
+        return importlib.import_module(name)
     pressed: list[FrameType | None] = []
     signal.signal(signal.SIGINT, lambda _number, frame: pressed.append(frame))
     try:
-        yield
+        module = importlib.import_module(name)
     finally:
         signal.signal(signal.SIGINT, previous)
     if pressed:
         previous(signal.SIGINT, pressed[0])
+    return module

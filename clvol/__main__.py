@@ -1,10 +1,14 @@
 """The command `clvol`, which `python -m clvol` is too: quiet at Ctrl-C before and after its work."""
 
-import signal
-from typing import NoReturn
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    import signal
+    from typing import NoReturn
+else:
+    import _signal as signal  # what `signal` wraps: it is there already, and no import can be interrupted
 
 
-def main() -> NoReturn:
+def main() -> "NoReturn":
     """Run the command and exit.
 
     While modules are loaded Ctrl-C ends the process at once, where Python would print what it was importing.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import signal
 import subprocess
@@ -13,6 +14,7 @@ import numpy as np
 import OpenImageIO as oiio  # noqa: N813
 import pytest
 from click.testing import CliRunner, Result
+from places import ROOT
 from signals import press_key
 
 import clvol
@@ -58,7 +60,7 @@ def test_ctrl_c_waits_for_an_import(monkeypatch: pytest.MonkeyPatch) -> None:
         return interrupts
 
     loaded: list[str] = []
-    monkeypatch.setattr(clvol, "import_module", import_module)
+    monkeypatch.setattr(importlib, "import_module", import_module)
     monkeypatch.setitem(clvol._EXPORTS, "Interrupt", "clvol.base.interrupts")
     with pytest.raises(KeyboardInterrupt):
         _ = clvol.Interrupt
@@ -271,3 +273,12 @@ clvol.__main__.main()
     )
     done = subprocess.run([sys.executable, "-m", "interrupted"], cwd=tmp_path, check=False)
     assert done.returncode == 130
+
+
+def test_until_ctrl_c_is_quiet_nothing_is_imported() -> None:
+    """An interrupt of an import is told with a traceback, and no import can be told to be silent."""
+    code = "import sys; sys.path.insert(0, {!r}); known = set(sys.modules); import clvol.__main__; "
+    code += "print(*sorted(set(sys.modules) - known))"
+    command = [sys.executable, "-I", "-S", "-c", code.format(str(ROOT))]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["clvol", "clvol.__main__", "clvol.version"]
