@@ -268,7 +268,7 @@ def test_a_picture_is_scaled_before_it_is_inverted(load, tmp_path, given, expect
     picture = (
         f'Texture "a" "spectrum" "imagemap" "string filename" "a.pfm" "string encoding" "linear" {given}'
     )
-    scene = load(f'{picture} Material "diffuse" "texture reflectance" "a" Shape "sphere"')
+    scene = load(f'{picture} Material "diffuse" "texture reflectance" "a" Shape "cylinder"')
     found = scene.shapes[0].bsdf.front.reflectance
     assert found.pixels[..., 1] == pytest.approx(expected(texels))
     assert (found.to_uv @ [0.25, 0.25, 1])[:2] == pytest.approx([0.25, 0.75])
@@ -325,6 +325,54 @@ def test_a_scaled_texture_is_a_product(load, tmp_path):
     product = 'Texture "b" "spectrum" "scale" "texture tex" "a" "float scale" .5'
     scene = load(f'{picture} {product} Material "diffuse" "texture reflectance" "b" Shape "sphere"')
     assert scene.shapes[0].bsdf.front.reflectance.pixels == pytest.approx(0.5 * (1 - 0.4 * 0.5))
+
+
+def rows_of(*values):
+    """A picture one pixel wide, from the top, as .pfm, which begins at the bottom."""
+    pixels = np.repeat(np.float32(values[::-1]), 3)
+    return b"PF\n1 %d\n-1\n" % len(values) + pixels.tobytes()
+
+
+PICTURE = 'Texture "p" "spectrum" "imagemap" "string filename" "p.pfm" "string filter" "point" '
+PICTURED = PICTURE + 'Material "diffuse" "texture reflectance" "p" '
+
+
+@pytest.mark.parametrize("stretch", ["", "Scale 1 1 1.0001"], ids=["quadric", "mesh"])
+def test_the_top_of_a_picture_is_at_the_north_pole_of_a_sphere(load, tmp_path, stretch):
+    """In pbrt v is 0 where z is least, and pictures begin at v = 1."""
+    (tmp_path / "p.pfm").write_bytes(rows_of(0.9, 0.1))
+    camera = CAMERA.replace("LookAt 0 0 -5  0 0 0  0 1 0", "LookAt 0 -5 0  0 0 0  0 0 1")
+    scene = load(f'LightSource "infinite" "rgb L" [1 1 1] {PICTURED} {stretch} Shape "sphere"', camera)
+    picture = clvol.render(scene, spp=4, size=(15, 10)).image[..., 0]
+    assert picture[3, 7] == pytest.approx(0.9, abs=1e-3)
+    assert picture[6, 7] == pytest.approx(0.1, abs=1e-3)
+
+
+def test_shapes_share_a_material_each_with_its_own_places(load, tmp_path):
+    """A disk's u is the angle, and its v falls to 0 at the rim; mixtures have places too."""
+    (tmp_path / "p.pfm").write_bytes(rows_of(0.9, 0.1))
+    plain = 'MakeNamedMaterial "a" "string type" "diffuse" "texture reflectance" "p" '
+    plain += 'MakeNamedMaterial "b" "string type" "conductor" '
+    mixed = 'MakeNamedMaterial "m" "string type" "mix" "string materials" ["a" "b"] NamedMaterial "m" '
+    triangle = 'Shape "trianglemesh" "point3 P" [0 0 0 1 0 0 0 1 0] "point2 uv" [0 0 1 0 0 1] '
+    shapes = f'Shape "disk" {triangle} Shape "sphere" Shape "cylinder" '
+    scene = load(f'{PICTURE}{plain}{mixed}{shapes} NamedMaterial "b" {shapes}')
+    disk, mesh, sphere, cylinder, *metals = (one.bsdf for one in scene.shapes)
+    assert len({id(one) for one in metals}) == 1
+    places = [one.first.front.reflectance.to_uv for one in (disk, mesh, sphere, cylinder)]
+    r, turn = 0.3, 0.2
+    assert places[0] @ [r, turn, 1] == pytest.approx([turn, 1 - (1 - r), 1])
+    np.testing.assert_array_equal(places[1], places[3])
+    assert places[1] @ [0.2, 0.3, 1] == pytest.approx([0.2, 0.7, 1])
+    assert places[2] @ [0.2, 0.3, 1] == pytest.approx([0.2, 0.3, 1])
+
+
+def test_files_are_found_from_a_folder_beside(load, tmp_path, monkeypatch):
+    """By a relative name of the scene too."""
+    (tmp_path / "p.pfm").write_bytes(rows_of(0.5))
+    load(f'{PICTURED} Shape "sphere"')
+    monkeypatch.chdir(tmp_path.parent)
+    assert len(clvol.load_file(f"{tmp_path.name}/scene.pbrt").shapes) == 1
 
 
 def test_what_cannot_be_rendered_is_told_at_once(load):
