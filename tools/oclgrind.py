@@ -102,6 +102,7 @@ CASES = {
         "colours", {}, {"technique": "spectral", "majorant": "grid", "probability": "max"}
     ),
     "flakes": Case("flakes", {}, {"technique": "delta", "majorant": "grid", "shadow_cache": "off"}),
+    "woven": Case("woven", {}, {"technique": "decomposition", "majorant": "grid"}),
     "flames": Case("flames", {}, {"majorant": "grid", "probability": "average"}, uninitialised=False),
     "within": Case("within", {}),
     "a meter": Case("a meter", {}),

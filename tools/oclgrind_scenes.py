@@ -205,6 +205,19 @@ def flakes() -> clvol.Scene:
     return clvol.load_dict({"type": "scene", "sensor": pinhole(), "sun": sun, "fog": box(fog)})
 
 
+def woven() -> clvol.Scene:
+    """Fog of microflakes that differ from place to place, and more of them in a mixture."""
+    matrices = np.ones((1, 2, 2, 1)) * np.array((0.5, 0.9, 0.2, 0.1, 0.0, 0.1))
+    matrices[0, 1] *= 0.5
+    phase = {"type": "sggx", "S": {"type": "gridvolume", "data": matrices}}
+    fog = {"type": "heterogeneous", "sigma_t": field(CELLS), "albedo": 0.8, "scale": 6.0, "phase": phase}
+    mixture = {"type": "blendphase", "weight": 0.4, "a": phase, "b": {"type": "hg"}}
+    ball = {"type": "homogeneous", "albedo": 0.8, "phase": mixture}
+    shape = {"type": "sphere", "radius": 0.5, "bsdf": {"type": "null"}, "interior": ball}
+    sun = {"type": "directional", "direction": (0.2, -1.0, 0.5)}
+    return clvol.load_dict({"type": "scene", "sensor": pinhole(), "sun": sun, "fog": box(fog), "ball": shape})
+
+
 def within() -> clvol.Scene:
     """A camera in a ball of glass that is filled with fog."""
     fog = {"type": "homogeneous", "sigma_t": 0.5, "albedo": 0.8}
@@ -256,6 +269,7 @@ MADE = {
     "colours": colours,
     "flames": flames,
     "flakes": flakes,
+    "woven": woven,
     "within": within,
     "a meter": plate,
     "a target": target,

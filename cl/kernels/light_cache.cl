@@ -44,7 +44,7 @@ INLINE float least_extinction(const Scene *scene, float3 p)
         __global const Volume *volume = scene->volumes + medium->sigma_t_volume;
         const float3 value = volume_value3(scene, volume, transform_point(volume->world_to_index, p));
 #if CLVOL_PHASE_SGGX
-        extinction += load_vector(medium->sigma_t) * density3_of(scene, medium, value) * mean_area(scene, medium);
+        extinction += load_vector(medium->sigma_t) * density3_of(scene, medium, value) * mean_area(scene, medium, p);
 #else
         extinction += load_vector(medium->sigma_t) * density3_of(scene, medium, value);
 #endif

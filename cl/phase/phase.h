@@ -29,8 +29,8 @@ INLINE float lobe_pdf(__global const Phase *lobe, float3 wo, float3 wi)
     if (IS_PHASE(lobe, TABPHASE))
         return tabphase_pdf(lobe, wo, wi);
 #endif
-#if CLVOL_PHASE_SGGX
-    if (IS_PHASE(lobe, SGGX))
+#if CLVOL_PHASE_SGGX && !CLVOL_HAS_VARIED_FLAKES
+    if (IS_SGGX(lobe))
         return sggx_pdf(lobe, wo, wi);
 #endif
     return isotropic_pdf(lobe, wo, wi);
@@ -46,8 +46,8 @@ INLINE float3 lobe_sample(__global const Phase *lobe, float3 wo, float u, float 
     if (IS_PHASE(lobe, TABPHASE))
         return tabphase_sample(lobe, wo, u, v, pdf);
 #endif
-#if CLVOL_PHASE_SGGX
-    if (IS_PHASE(lobe, SGGX))
+#if CLVOL_PHASE_SGGX && !CLVOL_HAS_VARIED_FLAKES
+    if (IS_SGGX(lobe))
         return sggx_sample(lobe, wo, u, v, pdf);
 #endif
     return isotropic_sample(lobe, wo, u, v, pdf);

@@ -4,9 +4,29 @@
    has lobes.  The first of those names the volume of w, -1 where shares are the same everywhere. */
 #ifndef CLVOL_PHASE_VARIED_H
 #define CLVOL_PHASE_VARIED_H
-#if CLVOL_HAS_VARIED_PHASE
+#if CLVOL_HAS_VARIED_PHASE && CLVOL_HAS_SCATTERING
 #include "density/volume.h"
 #include "phase/phase.h"
+
+/* Of a lobe that may differ from place to place by itself. */
+INLINE float lobe_pdf_at(const Scene *scene, __global const Phase *lobe, float3 p, float3 wo, float3 wi)
+{
+#if CLVOL_HAS_VARIED_FLAKES
+    if (IS_SGGX(lobe))
+        return sggx_pdf_at(scene, lobe, p, wo, wi);
+#endif
+    return lobe_pdf(lobe, wo, wi);
+}
+
+INLINE float3 lobe_sample_at(const Scene *scene, __global const Phase *lobe, float3 p, float3 wo, float u, float v,
+                             float *pdf)
+{
+#if CLVOL_HAS_VARIED_FLAKES
+    if (IS_SGGX(lobe))
+        return sggx_sample_at(scene, lobe, p, wo, u, v, pdf);
+#endif
+    return lobe_sample(lobe, wo, u, v, pdf);
+}
 
 INLINE float mixture_weight(const Scene *scene, __global const Medium *medium, float3 p)
 {
@@ -28,7 +48,7 @@ INLINE float varied_phase_pdf(const Scene *scene, __global const Medium *medium,
     const float weight = mixture_weight(scene, medium, p);
     float pdf = 0.0f;
     for (int n = 0; n < medium->phase_count; ++n)
-        pdf += lobe_share(lobes + n, medium->phase_count, weight) * lobe_pdf(lobes + n, wo, wi);
+        pdf += lobe_share(lobes + n, medium->phase_count, weight) * lobe_pdf_at(scene, lobes + n, p, wo, wi);
     return pdf;
 }
 
@@ -47,7 +67,7 @@ INLINE float3 varied_phase_sample(const Scene *scene, __global const Medium *med
             break;
         pick -= share;
     }
-    const float3 wi = lobe_sample(chosen, wo, u, v, pdf);
+    const float3 wi = lobe_sample_at(scene, chosen, p, wo, u, v, pdf);
     *pdf = varied_phase_pdf(scene, medium, p, wo, wi);
     return wi;
 }

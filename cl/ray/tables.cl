@@ -5,6 +5,9 @@
 #include "density/volume.h"
 #endif
 #include "ray/given.h"
+#if CLVOL_HAS_VARIED_AREAS
+#include "tracking/walk.h"
+#endif
 #if CLVOL_RAY_MAJORANT
 #include "majorant/majorant.h"
 #include "tracking/walk.h"
@@ -24,6 +27,9 @@ __kernel void tables(CLVOL_ARGUMENTS, __global const float *given, __global floa
             float scale = in.medium->sigma_t[c] * given[7];
 #if CLVOL_PHASE_SGGX
             scale *= projected_area(&scene, in.medium, in.world_ray.d);
+#endif
+#if CLVOL_HAS_VARIED_AREAS
+            scale *= area_share(&in, in.index_ray.o + t * in.index_ray.d);
 #endif
 #if CLVOL_HAS_HETEROGENEOUS
             __global const Volume *volume = scene.volumes + in.medium->sigma_t_volume;

@@ -31,6 +31,13 @@ INLINE MediumRay medium_ray(const Scene *scene, __global const Medium *medium, R
     in.scale *= projected_area(scene, medium, world.d);
 #endif
     in.rate = extinction_max(in.scale);
+#if CLVOL_HAS_VARIED_AREAS
+    in.flakes = area_volume(scene, medium);
+    in.most_area = projected_area(scene, medium, world.d);
+    in.flake_ray = world;
+    if (in.flakes >= 0)
+        in.flake_ray = transform_ray(scene->volumes[in.flakes].world_to_index, world);
+#endif
 #if CLVOL_HAS_HETEROGENEOUS
     if (!is_homogeneous(medium))
         in.index_ray = transform_ray(scene->volumes[medium->sigma_t_volume].world_to_index, world);

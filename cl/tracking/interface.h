@@ -33,6 +33,11 @@ typedef struct {
     int channel;      /* the one followed, where a path follows one */
     Extinction scale; /* sigma_t = scale * density; the coefficient itself where it is constant */
     float rate;       /* majorant = rate * bound */
+#if CLVOL_HAS_VARIED_AREAS
+    int flakes;       /* the volume by whose microflakes the extinction goes, as well; -1 for none */
+    float most_area;  /* of these, which `scale` has */
+    Ray flake_ray;    /* the ray in its index space */
+#endif
 } MediumRay;
 
 INLINE void stop_walk(float t, Tally *tally)
@@ -46,6 +51,9 @@ INLINE MediumRay rest_of_ray(MediumRay in, float t)
 {
     in.index_ray.o += t * in.index_ray.d;
     in.world_ray.o += t * in.world_ray.d;
+#if CLVOL_HAS_VARIED_AREAS
+    in.flake_ray.o += t * in.flake_ray.d;
+#endif
     in.t_max -= t;
     return in;
 }

@@ -7,6 +7,9 @@
 #include "core/random.h"
 #include "density/lookup.h"
 #include "density/transfer.h"
+#if CLVOL_HAS_VARIED_AREAS
+#include "phase/sggx.h"
+#endif
 #include "tracking/interface.h"
 #include "tracking/probability.h"
 #include "tracking/record.h"
@@ -41,6 +44,19 @@ INLINE bool next_tentative(Segment *segment, float *depth, Tally *tally)
     return true;
 }
 
+#if CLVOL_HAS_VARIED_AREAS
+/* The area of microflakes across the ray at index position p, as a share of the most, which the scale has. */
+INLINE float area_share(const MediumRay *in, float3 p)
+{
+    if (in->flakes < 0)
+        return 1.0f;
+    const float t = dot_of(p - in->index_ray.o, in->index_ray.d) / dot_of(in->index_ray.d, in->index_ray.d);
+    float3 diagonal, rest;
+    flake_matrix(in->scene, in->scene->volumes + in->flakes, in->flake_ray.o + t * in->flake_ray.d, &diagonal, &rest);
+    return matrix_area(diagonal, rest, in->world_ray.d) / in->most_area;
+}
+#endif
+
 /* sigma_t at index position p: one look-up. */
 INLINE Extinction extinction_at(const MediumRay *in, float3 p, Stream *stream, Tally *tally)
 {
@@ -48,10 +64,18 @@ INLINE Extinction extinction_at(const MediumRay *in, float3 p, Stream *stream, T
     tally->lookups += 1;
 #if CLVOL_EXTINCTION == 3 && CLVOL_HAS_COLOURED_VOLUME
     const float3 made = density3_of(in->scene, in->medium, density3(in->scene, volume, p, stream));
+#if CLVOL_HAS_VARIED_AREAS
+    const Extinction sigma_t = in->scale * made * area_share(in, p);
+#else
     const Extinction sigma_t = in->scale * made;
+#endif
 #else
     const float value = density(in->scene, volume, p, in->channel, stream);
+#if CLVOL_HAS_VARIED_AREAS
+    const Extinction sigma_t = in->scale * (density_of(in->scene, in->medium, value) * area_share(in, p));
+#else
     const Extinction sigma_t = in->scale * density_of(in->scene, in->medium, value);
+#endif
 #endif
     RECORD_LOOKUP(in, p, sigma_t, tally);
     return sigma_t;
@@ -74,7 +98,16 @@ INLINE __global const float *cell_row(const MediumRay *in, __global const float 
 /* The coefficient in such a row. */
 INLINE Extinction cell_extinction(const MediumRay *in, __global const float *row)
 {
+#if CLVOL_HAS_VARIED_AREAS
+    const float least = least_share(in->scene, in->medium);
 #if CLVOL_DENSITY_CHANNELS == 1
+    return in->scale * (least * row[0]);
+#elif CLVOL_EXTINCTION == 3
+    return in->scale * least * load_vector(row);
+#else
+    return in->scale * (least * row[in->channel]);
+#endif
+#elif CLVOL_DENSITY_CHANNELS == 1
     return in->scale * row[0];
 #elif CLVOL_EXTINCTION == 3
     return in->scale * load_vector(row);

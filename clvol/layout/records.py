@@ -226,12 +226,16 @@ RECORDS = {
 RARE_RECORDS = {"Glow": "CLVOL_HAS_GLOW", "MeterFace": "CLVOL_HAS_METER"}
 """Records that few scenes have, and the macro that says so: what others compile does not hold them."""
 
-RARE_KINDS = {"TEXTURE_VOLUME": "CLVOL_HAS_VOLUME_TEXTURES", "PHASE_SGGX": "CLVOL_PHASE_SGGX"}
+RARE_KINDS = {
+    "TEXTURE_VOLUME": "CLVOL_HAS_VOLUME_TEXTURES",
+    "PHASE_SGGX": "CLVOL_PHASE_SGGX",
+    "PHASE_MIXED_SGGX": "CLVOL_PHASE_MIXED_SGGX",
+}
 """The same of numbered kinds."""
 
 ENUMS = {
     "SHAPE": ("NONE", "CUBE", "SPHERE"),
-    "PHASE": ("ISOTROPIC", "HG", "RAYLEIGH", "TABPHASE", "SGGX"),
+    "PHASE": ("ISOTROPIC", "HG", "RAYLEIGH", "TABPHASE", "SGGX", "MIXED_SGGX"),
     "TRANSFER": ("SIGMA_T", "ALBEDO", "EMISSION"),  # in the order of a medium's entries
     "EMITTER": ("CONSTANT", "ENVMAP", "DIRECTIONAL", "POINT", "SPOT", "AREA", "SUN", "PROJECTOR"),
     "METER": ("TRIANGLE", "SPHERE", "DISK", "CYLINDER"),

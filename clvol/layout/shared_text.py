@@ -35,7 +35,16 @@ _NUMBERS = (
 """Names in `clvol.layout.constants`, which kernels know by the same."""
 
 
-RARE = ("TABPHASE", "SGGX", "PRINCIPLED", "PRINCIPLED_GLASS", "PRINCIPLED_THIN", "BLEND", "BENT")
+RARE = (
+    "TABPHASE",
+    "SGGX",
+    "MIXED_SGGX",
+    "PRINCIPLED",
+    "PRINCIPLED_GLASS",
+    "PRINCIPLED_THIN",
+    "BLEND",
+    "BENT",
+)
 """Kinds of material and phase function that few scenes have: what others compile does not name them."""
 
 

@@ -84,6 +84,7 @@ def _technique(features: Features, asked: Mapping[str, str]) -> tuple[str, str]:
         "channels are attenuated differently": features.chromatic_extinction,
         "samples are independent": not SAMPLERS[sampler].low_discrepancy,
         "densities are classified after they are interpolated": features.interpolated_transfers,
+        "the extinction is that of microflakes, which differ from place to place": features.varied_areas,
         "look-ups are stochastic": asked["lookup"] == "stochastic",
     }
     against = [reason for reason, holds in hurdles.items() if holds]

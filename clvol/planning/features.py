@@ -49,6 +49,8 @@ class Features:
     phases: tuple[str, ...] = ()
     blend: bool = False
     varied_phases: bool = False
+    varied_flakes: bool = False
+    varied_areas: bool = False
     scattering: bool = False
     emitters: int = 0
     constant: bool = False

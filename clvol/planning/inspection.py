@@ -39,7 +39,7 @@ from clvol.scene.medium_facts import (
     medium_volumes,
     scatters,
 )
-from clvol.scene.phase import phase_lobes
+from clvol.scene.phase import lobe_kind, phase_lobes
 from clvol.scene.primitives import QUADRICS, mesh_of
 from clvol.scene.sides import bsdf_parts
 from clvol.scene.thinness import thin_media
@@ -107,7 +107,10 @@ def _medium_features(media: list[records.Medium]) -> dict[str, Any]:
     emissive = [m for m in media if m.emits]
     glowing = [m for m in media if m.glows]
     lobes = [phase_lobes(m.phase) for m in media]
-    phases = {lobe.kind for mixture in lobes for lobe, _ in mixture}
+    phases = {
+        lobe_kind(m.phase, lobe) for m, mixture in zip(media, lobes, strict=True) for lobe, _ in mixture
+    }
+    phases |= {"sggx"} if "mixed_sggx" in phases else set()
     return {
         "media": len(media),
         "homogeneous": any(is_homogeneous(m) for m in media),
@@ -140,6 +143,8 @@ def _medium_features(media: list[records.Medium]) -> dict[str, Any]:
         "phases": tuple(sorted(kind.upper() for kind in phases)),
         "blend": any(len(mixture) > 1 for mixture in lobes),
         "varied_phases": any(m.phase_weight is not None for m in media),
+        "varied_flakes": any(m.flakes is not None for m in media),
+        "varied_areas": any(m.flakes is not None and isinstance(m.phase, records.Phase) for m in media),
         "scattering": any(map(scatters, media)),
     }
 

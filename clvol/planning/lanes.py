@@ -25,6 +25,7 @@ def _against_any(plan: Decisions) -> str:
         f"a majorant {majorant} is walked one path at a time": majorant in registry.MAJORANTS
         and not registry.MAJORANTS[majorant].in_lanes,
         "a transfer function classifies the density": features.transfers,
+        "microflakes differ from place to place": features.varied_areas,
         "the volume is a tree": settled is not None and (settled.top_trees or settled.tree_grid),
         "one path follows several channels": plan.extinction == 3,
     }

@@ -49,6 +49,12 @@ def refuse_impossible(features: Features, choices: Choices, chosen: Mapping[str,
                 "else of them",
                 hint=f"use {instead}, or a volume with filter_type nearest",
             )
+        if features.varied_areas and choice.interpolated:
+            raise OptionError(
+                f"{family} {name!r} integrates interpolated samples, of which microflakes that differ from "
+                "place to place make another extinction",
+                hint=f"use {instead}",
+            )
         if chosen["lookup"] == "stochastic" and not choice.linear:
             raise OptionError(
                 f"stochastic look-ups would bias {family} {name!r}, which is not linear in the density",

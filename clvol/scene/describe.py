@@ -274,6 +274,8 @@ def _phase(phase: records.PhaseFunction) -> str:
     if phase.table is not None:
         mean = _number(round(mean_cosine(phase.table), 4))
         return f"{phase.kind} ({len(phase.table.values)} values, mean cosine {mean})"
+    if isinstance(phase.flakes, records.GridVolume):
+        return f"{phase.kind} (S {_volume(phase.flakes)})"
     if phase.flakes is not None:
         return f"{phase.kind} (S {_point(phase.flakes)})"
     return phase.kind + (f" (g {_number(phase.g)})" if phase.kind == "hg" else "")

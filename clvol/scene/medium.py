@@ -47,7 +47,17 @@ def common_parameters(reader: Reader) -> dict[str, Any]:
     reader.ignore(has_spectral_extinction=bool)
     phase = reader.only_child("phase")
     built = reader.build(phase) if phase else Phase()
+    if isinstance(built, Phase) and isinstance(built.flakes, GridVolume) and _is_even(reader):
+        name = reader.children("phase")[0][0]
+        what = "an sggx whose S differs from place to place, where sigma_t does not"
+        reader.unsupported(what, name, "give a heterogeneous medium a gridvolume as sigma_t")
     return {"phase": built, "sample_emitters": sample_emitters, "name": reader.node.id}
+
+
+def _is_even(reader: Reader) -> bool:
+    """Whether the extinction is no volume of samples."""
+    found = reader.children("volume", "sigma_t") or reader.children("volume", "values")
+    return not found or not isinstance(reader.build(found[0][1]), GridVolume)
 
 
 def _extinction(reader: Reader, homogeneous: bool) -> tuple[Volume, Spectrum]:

@@ -20,6 +20,7 @@ LOOKED_UP = {
     "emission": "emits",
     "temperature": "emits",
     "phase_weight": "",
+    "flakes": "",
     "emission_density": "glows",
 }
 """What of a medium may be a grid volume, and the property of the medium without which it does not count."""
@@ -80,7 +81,7 @@ def _numbered(objects: Iterable[_T]) -> tuple[list[_T], list[int]]:
 
 
 def channels_of(volume: records.Volume) -> int:
-    """Channels of a volume: 1 or 3."""
+    """Channels of a volume: 1 or 3; 6 of the matrices of an sggx."""
     if isinstance(volume, records.ConstVolume):
         return len(volume.value)
     return volume.grid.channels

@@ -55,8 +55,8 @@ def blendphase(reader: Reader) -> BlendPhase:
         where = found[2][0] if len(found) > 2 else ""
         reader.fail(f"a blendphase takes two phase functions, got {len(found)}", where)
     blend = BlendPhase(weight, *(reader.build(node) for _, node in found))
-    if any(lobe.kind == "sggx" for lobe in _all_lobes(blend)):
-        reader.unsupported("an sggx in a mixture is not supported", hint="its extinction goes by direction")
+    if len({id(lobe.flakes) for lobe in _all_lobes(blend) if isinstance(lobe.flakes, GridVolume)}) > 1:
+        reader.unsupported("a mixture takes one sggx whose S differs from place to place")
     if _leaves(blend) > MAX_LOBES:
         reader.fail(f"a mixture takes at most {MAX_LOBES} phase functions, got {_leaves(blend)}")
     if sum(_varied(blend)) > 1:
@@ -88,6 +88,11 @@ def _all_lobes(phase: PhaseFunction) -> list[Phase]:
     if isinstance(phase, BlendPhase):
         return [*_all_lobes(phase.first), *_all_lobes(phase.second)]
     return [phase]
+
+
+def lobe_kind(phase: PhaseFunction, lobe: Phase) -> str:
+    """What a lobe of a phase function is; in a mixture an sggx leaves the extinction alone, as in Mitsuba."""
+    return "mixed_sggx" if lobe.kind == "sggx" and isinstance(phase, BlendPhase) else lobe.kind
 
 
 def _leaves(phase: PhaseFunction) -> int:

@@ -185,7 +185,7 @@ class Phase:
     kind: str = "isotropic"
     g: float = 0.0
     table: PhaseTable | None = None  # of a tabphase
-    flakes: tuple[float, ...] | None = None  # of an sggx: xx, yy, zz, xy, xz, yz of its matrix S
+    flakes: tuple[float, ...] | GridVolume | None = None  # of an sggx: xx, yy, zz, xy, xz, yz of its matrix S
 
 
 @dataclass(frozen=True)
@@ -206,6 +206,12 @@ def _varied_weight(phase: PhaseFunction) -> GridVolume | None:
     if isinstance(phase.weight, GridVolume):
         return phase.weight
     return _varied_weight(phase.first) or _varied_weight(phase.second)
+
+
+def _varied_flakes(phase: PhaseFunction) -> GridVolume | None:
+    if isinstance(phase, BlendPhase):
+        return _varied_flakes(phase.first) or _varied_flakes(phase.second)
+    return phase.flakes if isinstance(phase.flakes, GridVolume) else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,6 +253,11 @@ class Medium:
     def phase_weight(self) -> GridVolume | None:
         """The volume by which its phase functions are mixed, where one is."""
         return _varied_weight(self.phase)
+
+    @property
+    def flakes(self) -> GridVolume | None:
+        """The volume of the matrices S of its sggx, where they differ from place to place."""
+        return _varied_flakes(self.phase)
 
     @property
     def emits(self) -> bool:

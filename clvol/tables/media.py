@@ -16,6 +16,7 @@ from clvol.tables.affine import centred, from_centred, rows_3x4
 from clvol.tables.apart import peak_extinction
 from clvol.tables.blackbody import blackbody_rgb
 from clvol.tables.colours import rgb
+from clvol.tables.phases import has_varied_lobes
 
 if TYPE_CHECKING:
     from clvol.tables.prepare import PreparedScene
@@ -31,7 +32,7 @@ def medium_table(prepared: PreparedScene) -> np.ndarray:
     cell_offset = kd_root = links_first = phase_first = 0
     sky, suns = mean_incident_radiance(prepared.scene)
     alone = prepared.surfaces is None
-    varied = any(entry.medium.phase_weight is not None for entry in entries)
+    varied = has_varied_lobes(entries)
     boxes = entry_bounds(prepared.scene, prepared.boundaries)
     thin = thin_media(prepared.scene, prepared.boundaries)
     numbered = zip(table, entries, matter.of_entry, boxes, thin, strict=True)

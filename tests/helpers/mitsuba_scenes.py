@@ -53,6 +53,9 @@ def write_files(folder):
     _write_flakes(folder / "flakes.vol", (0.3, 0.9, 0.2, 0.1, -0.05, 0.15))
     _write_flakes(folder / "even.vol", (0.6, 0.6, 0.6, 0, 0, 0))
     _write_flakes(folder / "fibres.vol", (0.9, 0.9, 0.02, 0, 0, 0))
+    roots = np.random.default_rng(6).normal(size=(3, 3, 4, 3, 3)) * 0.5
+    matrices = np.einsum("...ij,...kj->...ik", roots, roots) + 0.04 * np.eye(3)
+    _write_flakes(folder / "woven.vol", matrices[..., [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
     (folder / "smooth.ply").write_bytes(_smooth_ply())
     (folder / "strands.txt").write_text(STRANDS)
     (folder / "painted.ply").write_bytes(_painted_ply())
@@ -72,9 +75,11 @@ def write_image(path, pixels):
 
 
 def _write_flakes(path, flakes):
-    """A volume of one sample with six channels, for an sggx."""
-    header = HEADER.pack(b"VOL", VERSION, FLOAT32, 1, 1, 1, 6, 0, 0, 0, 1, 1, 1)
-    path.write_bytes(header + np.array(flakes, "<f4").tobytes())
+    """A volume of one sample with six channels, or of several, for an sggx."""
+    samples = np.array(flakes, "<f4")
+    size = samples.shape[2::-1] if samples.ndim > 1 else (1, 1, 1)
+    header = HEADER.pack(b"VOL", VERSION, FLOAT32, *size, 6, 0, 0, 0, 1, 1, 1)
+    path.write_bytes(header + samples.tobytes())
 
 
 def _pair():

@@ -4,9 +4,11 @@
 that they can fail.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from probe import Probe, medium_of, scene_of
+from probe import Probe, grid_volume, medium_of, scene_of
 from sampling import DRAWS, uniforms
 from stat_tests import FALSE_ALARM, chi2_p_value
 
@@ -174,3 +176,115 @@ def test_flakes_of_a_sphere_mirror_light_evenly(device):
 def test_equal_ones_are_one_lobe():
     phase = Phase("sggx", flakes=FLAKES["any"])
     assert phase_lobes(phase) == [(phase, 1.0)]
+
+
+def woven_of():
+    """A grid of matrices, float32 (2, 3, 2, 6)."""
+    roots = np.random.default_rng(8).normal(size=(2, 3, 2, 3, 3)) * 0.5
+    matrices = np.einsum("...ij,...kj->...ik", roots, roots) + 0.05 * np.eye(3)
+    return matrices[..., [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].astype(np.float32)
+
+
+WOVEN = woven_of()
+MITSUBAS = [  # value and area of Mitsuba 3.9.1's sggx of that grid, at `places()` and `ways()`
+    (0.014239144511520863, 0.7259293794631958),
+    (0.07425570487976074, 1.2318916320800781),
+    (0.016579564660787582, 0.8581716418266296),
+    (0.06575733423233032, 0.9463836550712585),
+    (0.017622431740164757, 0.8814587593078613),
+    (0.03487466648221016, 0.7953313589096069),
+]
+
+
+def places():
+    return np.random.default_rng(5).uniform(0, 1, (6, 3)).astype(np.float32)
+
+
+def ways():
+    """Directions of travel before and after, float32 (6, 2, 3)."""
+    d = np.random.default_rng(3).normal(size=(6, 2, 3))
+    return (d / np.linalg.norm(d, axis=-1, keepdims=True)).astype(np.float32)
+
+
+def flakes_at(p):
+    """The six numbers at points of the unit cube, between samples at the centres of cells."""
+    size = np.array(WOVEN.shape[2::-1])
+    place = np.clip(np.asarray(p, float) * size - 0.5, 0, size - 1)
+    base = np.minimum(place.astype(int), size - 2)
+    total = 0.0
+    for corner in np.ndindex(2, 2, 2):
+        share = np.where(corner, place - base, 1 - (place - base)).prod(axis=-1)
+        x, y, z = (base + corner).T
+        total = total + share[:, None] * WOVEN[z, y, x]
+    return total
+
+
+def woven(device, albedo=0.5, phase=None):
+    """A probe of a medium of these flakes, and one beside it whose flakes are the same everywhere."""
+    phase = phase or Phase("sggx", flakes=grid_volume(WOVEN))
+    density = np.ones((2, 2, 2))
+    phases = phase, Phase("sggx", flakes=FLAKES["any"])
+    one, other = (medium_of(density, albedo=albedo, phase=p) for p in phases)
+    scene = scene_of(one)
+    return Probe(device, replace(scene, shapes=(*scene.shapes, replace(scene.shapes[0], interior=other))))
+
+
+CENTRE = np.float32(0.5)
+"""Of the unit cube, along each axis: where the device has its origin."""
+WOVEN_BODY = """
+    const float3 p = vload3(i, in0), wo = vload3(2 * i, in1), wi = vload3(2 * i + 1, in1);
+    for (int m = 0; m < 2; ++m) {
+        __global const Medium *medium = scene->media + m;
+        Ray ray;
+        ray.o = p - 0.25f * wo;
+        ray.d = wo;
+        const MediumRay in = medium_ray(scene, medium, ray, 1.0f, 0);
+        const float3 place = in.index_ray.o + 0.25f * in.index_ray.d;
+        out0[4 * i + 2 * m] = varied_phase_pdf(scene, medium, p, wo, wi);
+        out0[4 * i + 2 * m + 1] = in.scale * area_share(&in, place);
+    }"""
+WOVEN_HEADERS = ["phase/varied.h", "stages/medium_ray.h", "tracking/walk.h"]
+
+
+def test_they_differ_from_place_to_place_as_mitsubas_do(device):
+    out = np.zeros((6, 2, 2), np.float32)
+    woven(device).run(WOVEN_HEADERS, WOVEN_BODY, [out], [places() - CENTRE, ways()])
+    np.testing.assert_allclose(out[:, 0], MITSUBAS, rtol=2e-5)
+    wo, wi = np.moveaxis(ways().astype(float), 1, 0)
+    for n, six in enumerate(flakes_at(places())):
+        np.testing.assert_allclose(out[n, 0], [density(six, wo[n], wi[n]), area(six, wo[n])], rtol=2e-5)
+    even = FLAKES["any"]
+    np.testing.assert_allclose(out[:, 1, 0], density(even, wo, wi), rtol=2e-5)
+    np.testing.assert_allclose(out[:, 1, 1], area(even, wo), rtol=2e-5)
+
+
+@pytest.mark.parametrize("place", [0, 3])
+def test_directions_follow_the_pdf_of_their_place(device, place):
+    at, (x, y, z) = places()[place] - CENTRE, WO
+    body = (
+        uniforms("u", "v", "unused", "choice")
+        + f"""
+        const float3 wo = (float3)({x}f, {y}f, {z}f), p = (float3)({at[0]}f, {at[1]}f, {at[2]}f);
+        float pdf;
+        const float3 wi = varied_phase_sample(scene, scene->media, p, wo, u, v, choice, &pdf);
+        vstore4((float4)(wi, pdf), i, out0);"""
+    )
+    out = np.zeros((DRAWS, 4), np.float32)
+    woven(device).run(WOVEN_HEADERS, body, [out])
+    d = out[:, :3].astype(float)
+    here, elsewhere = (tuple(flakes_at(places()[[n]])[0]) for n in (place, 1))
+    assert p_value(d, here) > FALSE_ALARM > p_value(d, elsewhere)
+    apart = np.linalg.norm(d - WO, axis=1) > 0.05
+    np.testing.assert_allclose(out[apart, 3], density(here, WO, d[apart]), rtol=2e-3)
+
+
+def test_where_there_are_none_nothing_breaks(device):
+    """A matrix of zeros: no area, and a phase function that is finite."""
+    empty = np.zeros_like(WOVEN)
+    empty[1] = WOVEN[1]
+    out = np.zeros((1, 2, 2), np.float32)
+    p = np.array([[0.5, 0.5, 0.1]], np.float32) - CENTRE
+    probe = woven(device, phase=Phase("sggx", flakes=grid_volume(empty)))
+    probe.run(WOVEN_HEADERS, WOVEN_BODY, [out], [p, ways()[:1]])
+    assert out[0, 0, 1] == 0
+    np.testing.assert_allclose(out[0, 0, 0], 1 / (4 * np.pi), rtol=1e-5)

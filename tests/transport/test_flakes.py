@@ -195,6 +195,7 @@ def test_six_numbers_will_do():
 
 
 VARIED = np.concatenate([ONE, ONE * 0.5], axis=0)
+VARIED_FLAKES = {"type": "sggx", "S": {"type": "gridvolume", "data": VARIED}}
 
 
 @pytest.mark.parametrize(
@@ -208,10 +209,18 @@ VARIED = np.concatenate([ONE, ONE * 0.5], axis=0)
         ({"type": "sggx", "S": "1e7, 1e7, 1e7, 0, 0, 0"}, "an eigenvalue of 1e"),
         ({"type": "sggx", "S": {"type": "constvolume", "value": 0.5}}, "must be a gridvolume of six"),
         ({"type": "sggx", "S": {"type": "gridvolume", "data": np.ones((2, 2, 2))}}, "has six numbers"),
-        ({"type": "sggx", "S": {"type": "gridvolume", "data": VARIED}}, "varies from place to place"),
+        ({"type": "sggx", "S": {"type": "gridvolume", "data": VARIED}}, "where sigma_t does not; give a het"),
         (
-            {"type": "blendphase", "weight": 0.5, "a": FLAKES, "b": {"type": "isotropic"}},
-            "an sggx in a mixture is not supported",
+            {"type": "sggx", "S": {"type": "gridvolume", "data": np.concatenate([ONE, -ONE])}},
+            r"must be positive definite; .*, at \[1, 0, 0\]",
+        ),
+        (
+            {"type": "sggx", "S": {"type": "gridvolume", "data": np.concatenate([ONE, ONE * np.inf])}},
+            "must be finite",
+        ),
+        (
+            {"type": "blendphase", "weight": 0.5, "a": VARIED_FLAKES, "b": dict(VARIED_FLAKES)},
+            "a mixture takes one sggx whose S differs",
         ),
     ],
     ids=lambda value: "",

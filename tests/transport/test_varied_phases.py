@@ -75,3 +75,19 @@ def test_directions_are_drawn_as_lights_are_weighed():
     found, sampled = (render(scene, spp=1 << 17, seed=4, transmittance=t) for t in ("none", "ratio"))
     error = np.sqrt(found.variance + sampled.variance)
     assert (error < 0.01 * sampled.image).all() and (np.abs(found.image - sampled.image) < 4.5 * error).all()
+
+
+def test_a_medium_that_only_absorbs_may_have_one():
+    """Then nothing of the mixture is compiled."""
+    phase = {"type": "blendphase", "weight": {"type": "gridvolume", "data": np.eye(2)[None] * 0.5}}
+    phase |= {"a": {"type": "hg"}, "b": {"type": "isotropic"}}
+    fog = {"type": "homogeneous", "sigma_t": 0.7, "albedo": 0.0, "phase": phase}
+    sensor = {
+        "type": "orthographic",
+        "to_world": look_at([0.1, 0.2, -3], [0.1, 0.2, 0], [0, 1, 0]) @ scale([0.1, 0.1, 1]),
+        "film": {"type": "hdrfilm", "width": 2, "height": 2, "rfilter": {"type": "box"}},
+    }
+    parts = {"fog": {"type": "cube", "interior": fog, "bsdf": {"type": "null"}}, "sky": {"type": "constant"}}
+    result = render(load_dict({"type": "scene", "sensor": sensor} | parts), spp=4096, seed=1)
+    error = np.sqrt(result.variance.sum()) / result.image.size
+    assert abs(result.image.mean() - np.exp(-1.4)) < 4.5 * error < 0.02
