@@ -22,6 +22,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -43,6 +44,8 @@ OPTIONS = (
     *("--build-options", "-cl-opt-disable -Dalways_inline=noinline -U__clang__"),
 )
 POOL = 64
+SECONDS = 600
+"""That a case may take, of which the longest take half a minute."""
 CACHE_EDGE = 3
 """Cells of the cache of lights along its longest edge: filling it takes more steps than all else."""
 
@@ -209,16 +212,20 @@ def checked(name: str) -> Counter[Finding]:
         options = (*OPTIONS, "--uninitialized") if CASES[name].uninitialised else OPTIONS
         command = ["oclgrind", *options, "--log", str(log), sys.executable, __file__, "--inside", name]
         variables = {"PYOPENCL_NO_CACHE": "1", "PYTHONWARNINGS": "ignore", "CLVOL_DEVICE": "Oclgrind"}
-        done = subprocess.run(command, env=os.environ | variables, capture_output=True, text=True)
+        environment = os.environ | variables
+        try:
+            done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=SECONDS)
+        except subprocess.TimeoutExpired:
+            fail(f"{name} did not end in {SECONDS} s: make its scene smaller, or split it")
         if done.returncode:
             fail(f"{name} did not render ({done.returncode}): {done.stderr.strip().splitlines()[-1]}")
         return findings(log.read_text(encoding="utf-8", errors="replace") if log.exists() else "")
 
 
-def report(name: str, found: Counter[Finding]) -> bool:
-    """Print what was found in a case; whether there is a fault."""
+def report(name: str, found: Counter[Finding], seconds: float = 0.0) -> bool:
+    """Print what was found in a case, and how long that took; whether there is a fault."""
     faults = {finding: times for finding, times in found.items() if not finding.is_harmless}
-    click.echo(f"{name}: {'nothing' if not faults else ''}")
+    click.echo(f"{name}, {seconds:.0f} s: {'nothing' if not faults else ''}")
     for finding, times in faults.items():
         click.echo(
             f"  {finding.what}, {finding.kernel}, {times} times, at {', '.join(sorted(finding.places))}"
@@ -237,7 +244,11 @@ def main(cases: tuple[str, ...], inside: str | None) -> None:
         fail(f"no case {', '.join(sorted(unknown))}; there are {'; '.join(CASES)}")
     if not shutil.which("oclgrind"):
         fail("oclgrind is not installed (Debian: apt-get install oclgrind)")
-    outcomes = [report(name, checked(name)) for name in cases or CASES]
+    outcomes = []
+    for name in cases or CASES:
+        started = time.perf_counter()
+        found = checked(name)
+        outcomes.append(report(name, found, time.perf_counter() - started))
     sys.exit(any(outcomes))
 
 
