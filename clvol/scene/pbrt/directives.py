@@ -40,7 +40,7 @@ class Directives:
 
     def __init__(self, path: Path) -> None:
         self.tokens = Tokens(path)
-        self.folders = [path.parent]
+        self.folders = [path.parent.absolute()]  # names that are found are found again as they are
         self.read = Read()
         self.state = State()
         self._stack: list[tuple[str, State, str]] = []

@@ -25,11 +25,12 @@ SMOOTH = 1e-3
 
 
 class Materials:
-    """The materials of a scene, each made once."""
+    """The materials of a scene, each made once; those with textures once for each kind of surface."""
 
     def __init__(self, context: Context, textures: Textures) -> None:
         self.context, self.textures = context, textures
-        self._made: dict[int, Node] = {}
+        self._made: dict[tuple[int, str], Node] = {}
+        self._varied: set[int] = set()
         self._default: Node | None = None
         self._depth = 0
 
@@ -41,9 +42,16 @@ class Materials:
             return self._default
         if isinstance(material, str):
             material = self._named(material, where)
-        if id(material) not in self._made:
-            self._made[id(material)] = self._build(material)
-        return self._made[id(material)]
+        before = self.textures.varied
+        key = id(material), self.textures.surface if id(material) in self._varied else ""
+        if key not in self._made:
+            made = self._build(material)
+            if self.textures.varied > before:
+                self._varied.add(id(material))
+                key = id(material), self.textures.surface
+            self._made[key] = made
+        self.textures.varied += id(material) in self._varied  # a mixture of it varies too
+        return self._made[key]
 
     def is_interface(self, material: Thing | str | None, where: str) -> bool:
         """Whether it is no surface, only a boundary of media."""

@@ -19,6 +19,13 @@ if TYPE_CHECKING:
 
 FLIPPED = np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]])
 """From pbrt's (u, v) to a bitmap's: its first row is at v = 1."""
+SURFACES = {
+    "": np.eye(3),
+    "sphere": np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]]),
+    "disk": np.array([[0.0, 1, 0], [-1, 0, 1], [0, 0, 1]]),
+}
+"""From Mitsuba's (u, v) of a shape to pbrt's, where a sphere's v begins at its other pole, and a disk has the
+angle as its u and 1 - r as its v."""
 _WRAPS = {"repeat": "repeat", "clamp": "clamp", "black": "clamp", "octahedralsphere": "repeat"}
 
 
@@ -55,7 +62,9 @@ class Textures:
     def __init__(self, context: Context) -> None:
         self.context = context
         self._made: dict[tuple[str, str], Texture] = {}
-        self._nodes: dict[int, Node] = {}
+        self._nodes: dict[tuple[int, str], Node] = {}
+        self.surface = ""  # of `SURFACES`: what textures are for
+        self.varied = 0  # how many have been asked for
         self._depth = 0
 
     def of(
@@ -91,23 +100,30 @@ class Textures:
         """The picture of normals in a file, as it is stored."""
         path = find(parameters.string(name, ""), self.context.folders, parameters.place(name))
         where = parameters.place(name)
-        return self.context.node("texture", "bitmap", where, filename=str(path), raw=True, to_uv=FLIPPED)
+        if self.surface == "disk":
+            parameters.refuse("a normalmap on a disk", where)
+        self.varied += 1
+        to_uv = FLIPPED @ SURFACES[self.surface]
+        return self.context.node("texture", "bitmap", where, filename=str(path), raw=True, to_uv=to_uv)
 
     def value(self, texture: Texture, where: str) -> Node:
         """A texture as the value of a node's parameter."""
         if isinstance(texture, np.ndarray):
             return self.context.rgb(texture, where)
-        if id(texture) not in self._nodes:
-            self._nodes[id(texture)] = self._node(texture)
-        return self._nodes[id(texture)]
+        self.varied += 1
+        key = id(texture), self.surface
+        if key not in self._nodes:
+            self._nodes[key] = self._node(texture, SURFACES[self.surface])
+        return self._nodes[key]
 
-    def _node(self, texture: Picture | Board) -> Node:
+    def _node(self, texture: Picture | Board, places: np.ndarray) -> Node:
         make = self.context.node
         if isinstance(texture, Board):
             first, second = (self.context.rgb(one, texture.where) for one in texture.colors)
-            to_uv = np.diag([0.5, 0.5, 1]) @ texture.to_uv
+            to_uv = np.diag([0.5, 0.5, 1]) @ texture.to_uv @ places
             return make("texture", "checkerboard", texture.where, color0=first, color1=second, to_uv=to_uv)
-        common = {"to_uv": texture.to_uv, "filter_type": texture.filter_type, "wrap_mode": texture.wrap_mode}
+        to_uv = texture.to_uv @ places
+        common = {"to_uv": to_uv, "filter_type": texture.filter_type, "wrap_mode": texture.wrap_mode}
         if (texture.scale, *texture.factor) == (1.0, 1.0, 1.0, 1.0) and not texture.inverted:
             return make("texture", "bitmap", texture.where, filename=texture.path, raw=texture.raw, **common)
         pixels = self._pixels(texture)

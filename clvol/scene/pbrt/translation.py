@@ -16,7 +16,7 @@ from clvol.scene.pbrt.lights import Lights
 from clvol.scene.pbrt.materials import Materials
 from clvol.scene.pbrt.media import Media
 from clvol.scene.pbrt.shapes import Shapes
-from clvol.scene.pbrt.textures import Textures
+from clvol.scene.pbrt.textures import SURFACES, Textures
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -109,6 +109,7 @@ class _Translation:
         if interface and not divides:
             return None
         made = self.shapes.node(thing, parameters, matrix)
+        self.textures.surface = made.type if made.type in SURFACES else ""
         bsdf = self._alpha(self.materials.node(state.material, thing.where), thing, parameters)
         parameters.finish()
         made.add_nameless(bsdf)
