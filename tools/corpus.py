@@ -4,9 +4,11 @@
     python tools/corpus.py FOLDER --stand-ins    # judge the XML where meshes, volumes, pictures are missing
     python tools/corpus.py FOLDER --render       # also 16 x 16 pixels of one sample
 
-Each scene is read in a process of its own, with limits of time and memory.  Scenes that lack files, or values
-that a command line gives, count as incomplete, unless --stand-ins puts small files in their place.  With
---mitsuba PYTHON a line also says whether Mitsuba loads the scene.  Scenes without a sensor are fragments.
+Each scene is read in a process of its own, with limits of time and memory.  Scenes that lack files, or
+values that a command line gives, count as incomplete, unless --stand-ins puts small files in their place.
+Those with plugins that no release of Mitsuba has are counted apart.  With --mitsuba PYTHON a line also says
+whether Mitsuba 3 loads the scene; what is for version 2 or 3 and neither loads then counts as foreign too.
+Scenes without a sensor are fragments.
 """
 
 from __future__ import annotations
@@ -26,13 +28,28 @@ from typing import Any
 import click
 import numpy as np
 from folders import ROOT
+from mitsuba_names import is_foreign
 
 HELPERS = ROOT / "tests" / "helpers"
 SUFFIXES = (".xml", ".pbrt")
 _ROOT = re.compile(rb"<scene\b[^>]*\bversion\s*=\s*[\"']([^\"']*)", re.DOTALL)
 _SENSOR = re.compile(rb"<(sensor|camera|include)\b")
 _MEDIA = re.compile(rb"<medium\b|MakeNamedMedium")
-MITSUBA = "import sys, mitsuba as mi; mi.set_variant('scalar_rgb'); mi.load_file(sys.argv[1])"
+MITSUBA = """
+import sys, mitsuba as mi
+mi.set_variant("scalar_rgb")
+def stand(name, other):  # for integrators that this variant has not
+    def make(given):
+        plain = {key: given[key] for key in given if isinstance(given[key], (bool, int, float))}
+        return mi.load_dict({"type": other} | plain)
+    mi.register_integrator(name, make)
+stand("prbvolpath", "volpath")
+for name in ("prb", "prb_basic", "prb_projective", "direct_projective"):
+    stand(name, "path")
+mi.load_file(sys.argv[1])
+"""
+WANTED = (("versions 2 and 3", "23", 0.95), ("versions before 2", "01", 0.9))
+"""Of volumetric scenes: which, how these versions begin, and the share that should load."""
 MESHES, PICTURES = (".obj", ".ply"), (".exr", ".png", ".jpg", ".jpeg", ".hdr", ".pfm", ".tga", ".bmp")
 
 
@@ -161,17 +178,45 @@ def _serialized(copies: int = 64) -> bytes:
     return one * copies + struct.pack(f"<{copies}QI", *starts, copies)
 
 
+def is_incomplete(result: dict[str, Any]) -> bool:
+    """Whether the scene lacks a file or a value, whatever else is wrong."""
+    return any(kind == "missing" for kind, _ in result["faults"])
+
+
+def is_of_others(result: dict[str, Any]) -> bool:
+    """Whether the scene is for another program than a release of Mitsuba."""
+    if result["state"] != "refused" or is_incomplete(result):
+        return False
+    newer = result["version"][:1] in ("2", "3")
+    refused_twice = newer and result.get("mitsuba") is False
+    return refused_twice or any(is_foreign(what) for kind, what in result["faults"] if kind == "unsupported")
+
+
+def counts(results: list[dict[str, Any]]) -> tuple[int, int, int, int]:
+    """How many scenes are incomplete, are for other programs, are neither, and load."""
+    incomplete, foreign = sum(map(is_incomplete, results)), sum(map(is_of_others, results))
+    good = sum(one["state"] in ("loads", "renders") for one in results)
+    return incomplete, foreign, len(results) - incomplete - foreign, good
+
+
 def table(results: list[dict[str, Any]]) -> list[str]:
-    """How many load, by version and media; then what is refused, by how often."""
-    lines = ["", "version     media  scenes  incomplete  complete  load      %"]
-    groups = Counter((one["version"][:1], one["media"]) for one in results)
-    for (version, media), count in sorted(groups.items()):
-        mine = [one["state"] for one in results if (one["version"][:1], one["media"]) == (version, media)]
-        incomplete, good = mine.count("incomplete"), sum(state in ("loads", "renders") for state in mine)
-        complete = count - incomplete
-        share = f"{good / complete:6.0%}" if complete else "     –"
-        row = f"{count:>7} {incomplete:>11} {complete:>9} {good:>5}"
-        lines.append(f"{version + '.x':<11} {'yes' if media else 'no':<5} {row} {share}")
+    """How many load, by version and media; the shares that count; then what is refused, by how often."""
+    lines = ["", "version     media  scenes  incomplete  foreign  left  load      %"]
+    groups: dict[tuple[str, bool], list[dict[str, Any]]] = {}
+    for one in results:
+        version = one["version"] if one["version"] == "pbrt" else one["version"][:1] + ".x"
+        groups.setdefault((version, one["media"]), []).append(one)
+    for (version, media), mine in sorted(groups.items()):
+        incomplete, foreign, left, good = counts(mine)
+        share = f"{good / left:6.0%}" if left else "     –"
+        row = f"{len(mine):>7} {incomplete:>11} {foreign:>8} {left:>5} {good:>5}"
+        lines.append(f"{version:<11} {'yes' if media else 'no':<5} {row} {share}")
+    lines.append("")
+    for name, begin, wanted in WANTED:
+        mine = [one for one in results if one["media"] and one["version"][:1] in tuple(begin)]
+        _, _, left, good = counts(mine)
+        share = f"{good / left:.0%} (at least {wanted:.0%} should)" if left else "none to tell of"
+        lines.append(f"Complete volumetric scenes, {name}: {good} of {left} load, {share}")
     whats = Counter((kind, what) for one in results for kind, what in {tuple(f) for f in one["faults"]})
     lines += ["", "scenes  what is wrong"]
     lines += [f"{count:>6}  {kind}: {what[:100]}" for (kind, what), count in whats.most_common(60)]
@@ -205,6 +250,7 @@ def main(
             except subprocess.TimeoutExpired:
                 loads = 1
             also = "  Mitsuba: no " if loads else "  Mitsuba: yes"
+            result["mitsuba"] = not loads
         results.append(result)
         first = f"  {result['faults'][0][0]}: {result['faults'][0][1][:90]}" if result["faults"] else ""
         made = f"  ({result['stand_ins']} stand-ins)" if result.get("stand_ins") else ""

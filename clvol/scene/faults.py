@@ -31,7 +31,7 @@ class UnsupportedError(SceneError):
 
 
 class MissingFileError(SceneError):
-    """A file that a scene names and that is not there."""
+    """A file or folder that a scene names and that is not there."""
 
 
 class LostError(SceneError):

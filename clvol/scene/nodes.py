@@ -37,6 +37,7 @@ class Node(dict[str, Any]):
     folders : list of Path
         Where relative file names are looked for, first match first.
 
+    `old`: whether it is of a scene of Mitsuba before version 2.
     A scene's `aliases` are further ids: name -> (the id it stands for, where).
     """
 
@@ -46,6 +47,7 @@ class Node(dict[str, Any]):
         self.folders = folders if folders is not None else [Path()]
         self.places: dict[str, str] = {}
         self.aliases: dict[str, tuple[str, str]] = {}
+        self.old = False
         self._nameless = 0
 
     @property
@@ -84,7 +86,7 @@ class Node(dict[str, Any]):
         """The node as if these parameters were not given."""
         left = Node(self.where, self.kind, self.id, self.folders)
         left.update((key, value) for key, value in self.items() if key not in keys)
-        left.places = self.places
+        left.places, left.old = self.places, self.old
         return left
 
     def add_nameless(self, value: Node) -> None:

@@ -23,13 +23,16 @@ ON_ALL: dict[str, tuple[str, ...]] = {
     "sensor": ("shutter_open", "shutter_close"),
     "film": (
         *("attach_log", "high_quality_edges", "file_format", "banner", "filename", "digits", "variable"),
-        *("gamma", "exposure", "tonemap_method", "key", "burn", "label_0", "metadata_0"),
+        *("gamma", "exposure", "tonemap_method", "key", "burn"),
     ),
     "texture": ("max_anisotropy", "cache"),
     "integrator": ("strict_normals",),
     "emitter": ("sampling_weight",),
+    "sampler": ("dimension",),
 }
 """By kind of plugin: parameters that change no expected picture, or only how it is shown."""
+ON_FILMS = ("metadata[", "label[")
+"""How names of a film's parameters begin that are written into or on the picture."""
 
 
 SKIES = ("sky", "sun", "sunsky")
@@ -44,6 +47,20 @@ NOT_HEEDED: dict[tuple[str, str, str], str] = {
     ),
 }
 """By kind, type ("": any) and parameter of plugins: in what the picture is another, which is said."""
+
+NOT_HERE: dict[tuple[str, str], tuple[str, ...]] = {
+    ("bsdf", "conductor"): ("ext_eta",),
+    ("bsdf", "roughconductor"): ("ext_eta",),
+    ("emitter", "envmap"): ("gamma",),
+    ("medium", "homogeneous"): ("material",),
+    ("shape", "obj"): ("flip_tex_coords", "shape_index"),
+    ("texture", "bitmap"): ("channel", "wrap_mode_u", "wrap_mode_v"),
+    ("volume", "gridvolume"): ("min", "max"),
+}
+"""By kind and type: parameters of Mitsuba 0.6 that change the picture and that clvol has not.
+
+Other parameters that it does not know are none of Mitsuba 0.6's, and are not heeded either there.
+"""
 
 
 @dataclass(frozen=True)
@@ -126,11 +143,13 @@ RULES: dict[tuple[str, str], Rule] = {
         "volpath",
         dropped=(
             *("light_emissions", "use_light_cut", "short_vrls", "max_passes", "vrl_target_num"),
-            *("max_particle_depth", "initial_specular_throughput"),
+            *("max_particle_depth", "initial_specular_throughput", "samples_per_query"),
         ),
         said="volpath, which has the same expectation",
     ),
     ("integrator", "volpathsimple"): Rule("volpath_simple"),
+    ("integrator", "ptracer"): Rule(dropped=("granularity", "brute_force")),
+    ("integrator", "erpt"): Rule(dropped=("num_chains", "max_chains")),
 }
 """By element and type of a plugin; those without a rule are as they were."""
 

@@ -17,6 +17,7 @@ from clvol.scene import spectra
 from clvol.scene.faults import UnsupportedError
 from clvol.scene.lookup import find
 from clvol.scene.nodes import NAMELESS, Node
+from clvol.scene.old_names import NOT_HERE
 from clvol.scene.records import SpectrumColor
 from clvol.scene.spectrum_files import read_spectrum
 from clvol.scene.transforms import as_matrix
@@ -339,7 +340,23 @@ class Reader:
     def finish(self) -> None:
         """Note each parameter or inner plugin that nobody asked for among the faults."""
         for name in [key for key, _ in self.node.parameters() if key not in self._used]:
-            self.library.faults.note(self._left_over(name))
+            if not self._not_heeded(name):
+                self.library.faults.note(self._left_over(name))
+
+    def _not_heeded(self, name: str) -> bool:
+        """Whether an old scene gives a parameter that Mitsuba 0.6 did not have, and no misspelt one.
+
+        Mitsuba 0.6 warns of such "unqueried attributes" and goes on; files for its offspring have them.
+        """
+        value, plugin = self.node[name], (self.kind, self.type)
+        is_plugin = isinstance(value, Node) and not value.is_value
+        if not self.node.old or is_plugin or name in self._asked or name in NOT_HERE.get(plugin, ()):
+            return False
+        if did_you_mean(name, self._asked):
+            return False
+        what = f"'{name}' of {self.kind} '{self.type}' is not heeded: Mitsuba 0.6 has no such parameter"
+        self.library.faults.approximate(what, self.place(name))
+        return True
 
     def _left_over(self, name: str) -> SceneError:
         value, where = self.node[name], self.place(name)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.scene.old_mixtures import MIXTURES, blended
-from clvol.scene.old_names import NOT_HEEDED, NULL_IN_MEDIA, ON_ALL, RULES, SKIES, TAGS, UV, Rule
+from clvol.scene.old_names import NOT_HEEDED, NULL_IN_MEDIA, ON_ALL, ON_FILMS, RULES, SKIES, TAGS, UV, Rule
 from clvol.scene.spectra import srgb_to_linear
 from clvol.scene.xml_tree import Element
 
@@ -74,6 +74,8 @@ def _plugin(element: Element, faults: Faults) -> Element:
     dropped = (*rule.dropped, *ON_ALL.get(kind, ()))
     children = [_parameter(child, rule) for child in element.children]
     children = [child for child in children if child.attributes.get("name") not in dropped]
+    if kind == "film":
+        children = [child for child in children if not child.attributes.get("name", "").startswith(ON_FILMS)]
     children = [child for child in children if not _is_not_heeded(child, (kind, name), faults)]
     given = {child.attributes.get("name") for child in children}
     for tag, parameter, value in rule.added:

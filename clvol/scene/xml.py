@@ -17,7 +17,7 @@ from clvol.base.files import open_regular, other_kind
 from clvol.base.kinds import kind_of_file
 from clvol.errors import SceneError, either, shortened, shown
 from clvol.scene import transforms
-from clvol.scene.faults import Faults, UnsupportedError
+from clvol.scene.faults import Faults, MissingFileError, UnsupportedError
 from clvol.scene.lookup import find
 from clvol.scene.nodes import NAMELESS, Node
 from clvol.scene.upgrade import upgraded
@@ -235,6 +235,7 @@ class _XmlReader:
         else:
             attributes = self.attributes(element, "!type", "id", "name", "version")
         node = Node(element.where, element.tag, attributes.get("id", ""), folders)
+        node.old = element.old
         node.add("type", attributes["type"], element.where)
         for child in element.children:
             try:
@@ -308,7 +309,8 @@ class _XmlReader:
             fail(element, "<path> belongs directly into <scene>")
         found = [base / folder for base in parent.folders if os.path.isdir(base / folder)]
         if not found:
-            fail(element, f"folder '{folder}' does not exist", "paths are relative to the scene file")
+            hint = "paths are relative to the scene file"
+            raise MissingFileError(f"folder '{folder}' does not exist", element.where, hint)
         parent.folders.insert(0, found[0])
 
     # -- values ------------------------------------------------------------------------------------

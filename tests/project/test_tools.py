@@ -388,17 +388,3 @@ def test_the_knot_is_the_committed_one_and_a_closed_outward_surface(tool) -> Non
     mesh = clvol.load_file(SCENES / "jade.xml").shapes[-1].mesh
     np.testing.assert_allclose(mesh.vertices, vertices, atol=1e-5)
     assert not mesh_flaws(Mesh(vertices, faces, normals))
-
-
-def test_a_corpus_is_counted_by_what_loads_and_what_is_missing(tmp_path: Path) -> None:
-    sensor = '<sensor type="perspective"/>'
-    mesh = '<shape type="obj"><string name="filename" value="a.obj"/></shape>'
-    scenes = {"bad": f'{mesh}<bsdf type="felt"/>', "bare": mesh, "good": ""}
-    for name, inside in scenes.items():
-        (tmp_path / f"{name}.xml").write_text(f'<scene version="3.0.0">{sensor}{inside}</scene>')
-    (tmp_path / "part.xml").write_text('<scene version="3.0.0"><bsdf type="felt"/></scene>')
-    for options, wanted in ([], "refused incomplete loads"), (["--stand-ins"], "refused loads loads"):
-        command = [sys.executable, str(TOOLS / "corpus.py"), str(tmp_path), *options]
-        told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-        assert [line.split()[0] for line in told.splitlines() if ".xml" in line] == wanted.split()
-        assert "     1  unsupported: unknown bsdf 'felt'" in told

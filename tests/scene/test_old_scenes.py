@@ -126,13 +126,73 @@ def test_versions_from_2_on_are_not_upgraded():
     old(shape, version="1.2.3")
 
 
-def test_old_names_that_nobody_knows_are_faults_of_their_lines():
-    text = f'<scene version="0.6.0">{SENSOR}\n<shape type="cube"><float name="maxDepht" value="1"/></shape>\n\
+def test_old_names_that_are_misspelt_are_faults_of_their_lines():
+    text = (
+        f'<scene version="0.6.0">{SENSOR}\n<shape type="cube"><float name="flipNormal" value="1"/></shape>\n\
 <texture type="scale"><animation/></texture></scene>'
+    )
     with pytest.raises(clvol.SceneError) as caught:
         clvol.load_string(text)
-    assert "the text:2: unknown parameter 'max_depht' of shape 'cube'" in str(caught.value)
+    assert "the text:2: unknown parameter 'flip_normal' of shape 'cube'" in str(caught.value)
     assert "the text:3: unknown element <animation>" in str(caught.value)
+
+
+@pytest.mark.parametrize("value", ['integer name="{}" value="6"', 'rgb name="{}" value="1, 2, 3"'])
+def test_a_parameter_that_mitsuba_06_had_not_is_not_heeded_as_there_and_said(value):
+    shape = f"""<shape type="sphere"><emitter type="area"><spectrum name="radiance" value="1"/>
+        <{value.format("zzTop")}/></emitter></shape>"""
+    plain = (
+        '<shape type="sphere"><emitter type="area"><spectrum name="radiance" value="1"/></emitter></shape>'
+    )
+    found = old(shape)
+    said = "'zz_top' of emitter 'area' is not heeded: Mitsuba 0.6 has no such parameter"
+    assert found.approximated == (said,)
+    assert same(found, old(plain))
+    assert clvol.render(found, spp=1, size=(4, 4)).metadata["approximated"] == said
+    with pytest.raises(clvol.SceneError, match="unknown parameter 'zzTop' of emitter 'area'"):
+        new(shape)
+
+
+@pytest.mark.parametrize(
+    ("scene", "name"),
+    [
+        ('<medium id="m" type="homogeneous"><string name="material" value="skimmilk"/></medium>', "material"),
+        ('<bsdf id="b" type="conductor"><string name="extEta" value="water"/></bsdf>', "ext_eta"),
+        (
+            '<volume id="v" type="constvolume"><float name="value" value="1"/><phase type="hg"/></volume>',
+            "phase",
+        ),
+    ],
+)
+def test_what_mitsuba_06_had_and_plugins_are_no_unknown_parameters(scene, name):
+    user = {
+        "m": '<shape type="cube"><ref name="interior" id="m"/></shape>',
+        "b": '<shape type="cube"><ref id="b"/></shape>',
+        "v": """<shape type="cube"><medium name="interior" type="heterogeneous"><ref name="density" id="v"/>
+            <spectrum name="albedo" value="1"/></medium></shape>""",
+    }
+    with pytest.raises(clvol.SceneError, match=name):
+        old(scene, user[scene.split('"')[1]])
+
+
+def test_what_is_written_into_or_on_a_picture_is_left_out():
+    film = """<sensor type="perspective"><film type="hdrfilm">{}</film></sensor>"""
+    named = """<string name="metadata['renderTime']" value="$scene['renderTime']"/>
+        <string name="label[10, 10]" value="$integrator['maxDepth']"/>"""
+    found = old(sensor=film.format(named))
+    assert same(found, old(sensor=film.format(""))) and not found.approximated
+    with pytest.raises(clvol.SceneError, match="scene has no value"):
+        new(sensor=film.format(named))
+
+
+def test_what_only_sped_mitsuba_06_up_is_left_out():
+    samples = '<integer name="sampleCount" value="4"/>'
+    ours = f'<sensor type="perspective"><sampler type="stratified">{samples}</sampler></sensor>'
+    theirs = ours.replace(samples, samples + '<integer name="dimension" value="4"/>')
+    photons = """<integrator type="ptracer"><integer name="granularity" value="9"/>
+        <boolean name="bruteForce" value="true"/></integrator>"""
+    assert same(old(photons, sensor=theirs), old('<integrator type="ptracer"/>', sensor=ours))
+    assert not [said for said in old(photons, sensor=theirs).approximated if "not heeded" in said]
 
 
 def test_media_take_scattering_and_absorption_together():
