@@ -63,7 +63,11 @@ INLINE float light_irradiance(__global const Emitter *emitter, float3 p)
 #if CLVOL_HAS_PROJECTOR
     float2 uv;
     if (emitter->kind == EMITTER_PROJECTOR)
-        return value * projector_share(emitter, -d, &uv) / square;
+        return value * picture_share(emitter) * projector_share(emitter, -d, &uv) / square;
+#endif
+#if CLVOL_HAS_SPOT_TEXTURE
+    if (emitter->kind == EMITTER_SPOT)
+        return value * picture_share(emitter) * spot_falloff(emitter, -d) / square;
 #endif
     if (emitter->kind == EMITTER_SPOT)
         return value * spot_falloff(emitter, -d) / square;

@@ -12,4 +12,10 @@ INLINE float2 slide_point(__global const Emitter *emitter, float3 d, float along
     return (float2)(dot_of(d, to_frame(axis, 1.0f, 0.0f, 0.0f)), dot_of(d, to_frame(axis, 0.0f, 1.0f, 0.0f))) / along;
 }
 
+/* The mean of the picture, as a share of the light without one. */
+INLINE float picture_share(__global const Emitter *emitter)
+{
+    return emitter->first > 0 ? as_float(emitter->primitive) : 1.0f;
+}
+
 #endif

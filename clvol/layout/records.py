@@ -92,7 +92,7 @@ EMITTER = _record(
     ("shape", "i", 1),  # of an area light
     ("area", "f", 1),  # or the solid angle of a sun, or of a projector: `projector_frame`
     ("first", "i", 1),  # of a mesh's entries in `light_faces` and `light_cdf`; else 1 + its texture
-    ("primitive", "u", 1),  # first primitive of an area light
+    ("primitive", "u", 1),  # first primitive of an area light; of a picture's mean the bits of the float
     ("count", "u", 1),  # of its primitives, which follow each other
 )
 

@@ -78,7 +78,9 @@ def light_table(
             if picture is not None:
                 pictures = list(dict.fromkeys([*pictures, picture]))
                 table[i]["first"] = 1 + pictures.index(picture)
-                power[i] *= float(luminance(mean_radiance(picture)))
+                mean = mean_radiance(picture)
+                power[i] *= float(luminance(mean))
+                table[i]["primitive"] = _share(table[i]["value"], mean).view(np.uint32)
     faces, cdf = [np.zeros(0, np.uint32)], [np.zeros(0, np.float32)]
     if surfaces is not None:
         for i, (number, emission) in enumerate(shining, len(emitters)):
@@ -177,6 +179,12 @@ def envmap_arrays(emitter: records.EnvmapEmitter) -> dict[str, np.ndarray]:
         "env_marginal": marginal,
         "env_conditional": conditional,
     }
+
+
+def _share(value: np.ndarray, mean: np.ndarray) -> np.float32:
+    """What a picture of that mean leaves of a light, on the mean over channels."""
+    total = value.sum(dtype=np.float64)
+    return np.float32(value @ mean / total if total > 0 else 1.0)
 
 
 def _is_environment(emitter: records.Emitter) -> bool:

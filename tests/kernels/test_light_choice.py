@@ -6,6 +6,7 @@ from pictures import ball, box, gridded, hg_value, picture, unit, volume
 from probe import Probe, medium_of, scene_of
 
 import clvol
+from clvol.scene.materials import Bitmap
 from clvol.scene.records import (
     BlendPhase,
     ConstantEmitter,
@@ -68,6 +69,38 @@ def test_lights_are_chosen_with_the_probability_that_is_said(device, points, sha
     assert np.abs(said.sum(axis=1) - 1).max() < 1e-5
     assert np.abs(counted - said).max() < 3 / PICKS
     assert said.std(axis=0).max() > 0.03  # they do depend on the place
+
+
+PICTURE = np.full((4, 6, 3), 0.25, np.float32)
+PICTURE[0, 0] = (0.0, 6.0, 3.0)
+"""Of mean 0.333; 0.25 nearly everywhere."""
+
+
+@pytest.mark.parametrize("kind", ["projector", "spot"])
+def test_a_light_that_throws_a_picture_is_chosen_by_its_mean(device, kind):
+    """Beside a point light of the intensity that it has on its axis without the picture."""
+    at, bitmap = clvol.look_at((0.5, 2.5, 0.5), (0.5, 0.5, 0.5), (1, 0, 0)), Bitmap(PICTURE)
+    if kind == "spot":
+        thrown, strength = SpotEmitter((3.0,), at, 60.0, 55.0, texture=bitmap), 3.0
+    else:
+        thrown, strength = ProjectorEmitter(bitmap, 3.0, at, 60.0), 3.0 * np.pi
+    plain = PointEmitter((strength,), (0.5, 2.5, 0.5))
+    fog = box((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), medium_of(1.0, albedo=0.9))
+    scene = picture([fog], [thrown, plain], (0.5, 0.5, -3.0), (0.5, 0.5, 0.5))
+    probe = Probe(device, scene, shadow_cache="off", light_choice="contribution")
+    said = np.zeros((1, 2), np.float32)
+    body = """
+        for (uint light = 0; light < 2; ++light)
+            out0[light] =
+                light_probability(scene, light, vload3(0, in0)) - 0.25f * scene->emitters[light].select_pdf;
+        if (scene->emitters[0].kind == EMITTER_POINT) {
+            const float first = out0[0];
+            out0[0] = out0[1];
+            out0[1] = first;
+        }"""
+    probe.run(["emitter/emitter.h"], body, [said], [np.zeros((1, 3), np.float32)], stage="shade")
+    mean = PICTURE.mean()
+    np.testing.assert_allclose(said[0], 0.75 * np.array([mean, 1]) / (1 + mean), rtol=1e-4)
 
 
 # -- convolutions ------------------------------------------------------------------------------------
