@@ -367,6 +367,26 @@ def test_shapes_share_a_material_each_with_its_own_places(load, tmp_path):
     assert places[2] @ [0.2, 0.3, 1] == pytest.approx([0.2, 0.3, 1])
 
 
+@pytest.mark.parametrize("reverse", ["", "ReverseOrientation"])
+def test_triangles_without_places_have_pbrts(load, tmp_path, reverse):
+    """(0, 0), (1, 0), (1, 1) of each triangle's corners, in their order, whichever way it is turned."""
+    (tmp_path / "p.pfm").write_bytes(rows_of(0.9, 0.1))
+    quad = '"point3 P" [0 0 0 1 0 0 1 1 0 0 1 0] "integer indices" [0 1 2 0 2 3]'
+    plain, textured = load(
+        f'{reverse} Shape "trianglemesh" {quad} {PICTURED} Shape "trianglemesh" {quad}'
+    ).shapes
+    assert plain.mesh.uvs is None
+    mesh = textured.mesh
+    corners = {(0, 0), (1, 0), (1, 1)}
+    for face in mesh.faces:
+        places = {
+            tuple(uv): tuple(point[:2]) for uv, point in zip(mesh.uvs[face], mesh.vertices[face], strict=True)
+        }
+        assert set(places) == corners
+        middle = (1, 0) if places[1, 1] == (1, 1) else (1, 1)
+        assert places[0, 0] == (0, 0) and places[1, 0] == middle
+
+
 def test_files_are_found_from_a_folder_beside(load, tmp_path, monkeypatch):
     """By a relative name of the scene too."""
     (tmp_path / "p.pfm").write_bytes(rows_of(0.5))

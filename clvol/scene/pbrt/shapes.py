@@ -36,10 +36,18 @@ class Shapes:
         self.context = context
         self._raw: dict[int, RawMesh] = {}
         self._built: dict[tuple[int, bytes], tuple[Mesh, np.ndarray]] = {}
+        self._placed: dict[int, RawMesh] = {}
+        self._textured = False
         self._things: list[Thing] = []  # kept alive: their id() is a key
 
-    def node(self, thing: Thing, parameters: Parameters, matrix: np.ndarray) -> Node:
-        """A shape under `matrix`, without what it is made of."""
+    def surface(self, thing: Thing, matrix: np.ndarray) -> str:
+        """Of `textures.SURFACES`: which a shape is under `matrix`."""
+        round_ = thing.type == "sphere" and keeps_angles(matrix)
+        return thing.type if round_ or thing.type == "disk" else ""
+
+    def node(self, thing: Thing, parameters: Parameters, matrix: np.ndarray, textured: bool) -> Node:
+        """A shape under `matrix`, without what it is made of; `textured`: which has pictures on it."""
+        self._textured = textured
         builder = _BUILDERS.get(thing.type)
         if builder is None:
             hint = join_hints(did_you_mean(thing.type, _BUILDERS), f"supported: {listed(_BUILDERS)}")
@@ -93,7 +101,10 @@ class Shapes:
 
     def triangles(self, thing: Thing, parameters: Parameters, matrix: np.ndarray) -> Node:
         """Triangles from the file itself."""
-        return self._mesh(thing, self._once(thing, lambda: _indexed(parameters, 3)), matrix)
+        raw = self._once(thing, lambda: _indexed(parameters, 3))
+        if self._textured and raw.uvs is None:
+            raw = self._placed.setdefault(id(raw), _with_places(raw))
+        return self._mesh(thing, raw, matrix)
 
     def bilinear(self, thing: Thing, parameters: Parameters, matrix: np.ndarray) -> Node:
         """Bilinear patches: two triangles where they are flat, else many."""
@@ -226,6 +237,18 @@ def _indexed(parameters: Parameters, corners: int) -> RawMesh:
         wrong = indices.min() if indices.min() < 0 else indices.max()
         parameters.fail(f"'indices' name vertex {wrong} of {len(vertices)}", parameters.place("indices"))
     return RawMesh(vertices, indices.reshape(-1, corners), normals, uvs)
+
+
+def _with_places(raw: RawMesh) -> RawMesh:
+    """Triangles that share no vertices, each with pbrt's texture coordinates where none are given."""
+    faces = np.asarray(raw.faces)
+    vertices, normals = (
+        None if values is None else np.asarray(values)[faces].reshape(-1, 3)
+        for values in (raw.vertices, raw.normals)
+    )
+    assert vertices is not None
+    uvs = np.tile([[0.0, 0], [1, 0], [1, 1]], (len(faces), 1))
+    return RawMesh(vertices, np.arange(faces.size).reshape(faces.shape), normals, uvs)
 
 
 def _patches(raw: RawMesh) -> tuple[RawMesh, bool]:

@@ -16,7 +16,7 @@ from clvol.scene.pbrt.lights import Lights
 from clvol.scene.pbrt.materials import Materials
 from clvol.scene.pbrt.media import Media
 from clvol.scene.pbrt.shapes import Shapes
-from clvol.scene.pbrt.textures import SURFACES, Textures
+from clvol.scene.pbrt.textures import Textures
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -108,9 +108,9 @@ class _Translation:
         divides = self.sees_media and state.inside != state.outside
         if interface and not divides:
             return None
-        made = self.shapes.node(thing, parameters, matrix)
-        self.textures.surface = made.type if made.type in SURFACES else ""
+        self.textures.surface, before = self.shapes.surface(thing, matrix), self.textures.varied
         bsdf = self._alpha(self.materials.node(state.material, thing.where), thing, parameters)
+        made = self.shapes.node(thing, parameters, matrix, self.textures.varied > before)
         parameters.finish()
         made.add_nameless(bsdf)
         if state.area_light is not None and not interface:
