@@ -41,7 +41,7 @@ def sggx(reader: Reader) -> Phase:
         return Phase("sggx", flakes=values)
     if len(values) != 6:
         reader.fail(f"S of an sggx has six numbers, {NAMES}; got {len(values)}", "S")
-    if fault := _fault(values):
+    if fault := fault_of_matrix(values):
         reader.fail(f"S of an sggx {fault}", "S")
     return Phase("sggx", flakes=values)
 
@@ -56,7 +56,7 @@ def _of_volume(reader: Reader) -> tuple[float, ...] | GridVolume:
         reader.fail("S of an sggx must be a gridvolume of six channels", "S", f"they are {NAMES}")
     if volume.grid.channels != 6 or _is_even(volume.grid):
         return tuple(volume.grid.values.reshape(-1, volume.grid.channels)[0].astype(np.float64).tolist())
-    if fault := _fault_of_grid(volume):
+    if fault := fault_of_flakes(volume.grid):
         reader.fail(f"S of an sggx {fault}", "S")
     return volume
 
@@ -66,7 +66,8 @@ def _is_even(grid: DenseGrid) -> bool:
     return bool((samples == samples[:1, :1, :1]).all())
 
 
-def _fault(values: tuple[float, ...]) -> str:
+def fault_of_matrix(values: tuple[float, ...]) -> str:
+    """What is wrong with six numbers as S, "" if nothing."""
     if not np.isfinite(values).all():
         return "must be finite"
     return _fault_of_eigenvalues(np.linalg.eigvalsh(flake_matrix(values)), THINNEST)
@@ -81,11 +82,10 @@ def _fault_of_eigenvalues(found: np.ndarray, thinnest: float) -> str:
     return ""
 
 
-def _fault_of_grid(volume: GridVolume) -> str:
+def fault_of_flakes(grid: DenseGrid) -> str:
     """What is wrong with the first sample that won't do; a matrix of zeros is nothing, and will."""
-    assert isinstance(volume.grid, DenseGrid)
-    shape = volume.grid.values.shape[:3]
-    for first, samples in _chunks(volume):
+    shape = grid.values.shape[:3]
+    for first, samples in _chunks(grid):
         if not np.isfinite(samples).all():
             return "must be finite"
         found = np.linalg.eigvalsh(flake_matrix(samples))
@@ -100,10 +100,9 @@ def _fault_of_grid(volume: GridVolume) -> str:
     return ""
 
 
-def _chunks(volume: GridVolume) -> Iterator[tuple[int, np.ndarray]]:
+def _chunks(grid: DenseGrid) -> Iterator[tuple[int, np.ndarray]]:
     """The samples of a grid, float64 (n, 6), a bounded number at a time, and which is the first."""
-    assert isinstance(volume.grid, DenseGrid)
-    flat = volume.grid.values.reshape(-1, volume.grid.channels)
+    flat = grid.values.reshape(-1, grid.channels)
     for first in range(0, len(flat), _CHUNK):
         yield first, flat[first : first + _CHUNK].astype(np.float64)
 
@@ -126,7 +125,8 @@ def area_bounds(phase: PhaseFunction) -> tuple[float, float]:
     if not isinstance(phase.flakes, GridVolume):
         return _bounds(np.linalg.eigvalsh(flake_matrix(phase.flakes))[None])
     if phase.flakes not in _areas:
-        parts = [_bounds(np.linalg.eigvalsh(flake_matrix(part))) for _, part in _chunks(phase.flakes)]
+        assert isinstance(phase.flakes.grid, DenseGrid)
+        parts = [_bounds(np.linalg.eigvalsh(flake_matrix(part))) for _, part in _chunks(phase.flakes.grid)]
         _areas[phase.flakes] = min(least for least, _ in parts), max(most for _, most in parts)
     return _areas[phase.flakes]
 

@@ -141,10 +141,26 @@ def _shape(shape: records.Shape, seen: set[int]) -> Found:
     yield "to_world", _field(shape, "to_world", check, values.frozen)
     if isinstance(shape.emission, tuple):
         yield "emitter.radiance.value", _colour(shape, "emission", values.BRIGHTEST)
+    elif shape.emission is not None:
+        yield from _picture("emitter.radiance", shape.emission, seen)
     yield from _nested("bsdf", _bsdf(shape.bsdf, seen))
     for side in ("interior", "exterior"):
         if (medium := getattr(shape, side)) is not None:
             yield from _nested(f"{side}_medium", _medium(medium, seen))
+
+
+def _picture(name: str, picture: materials.Texture, seen: set[int]) -> Found:
+    """What a light shows or throws, as bright as lights may be."""
+    if id(picture) in seen:
+        return
+    if isinstance(picture, materials.Checkerboard):
+        yield from _nested(name, _bsdf(picture, seen, values.BRIGHTEST))
+    elif isinstance(picture, materials.Bitmap):
+        seen.add(id(picture))
+        yield f"{name}.data", _field(picture, "pixels", values.bright_texels, values.frozen)
+    elif isinstance(picture, materials.VolumeTexture) and id(picture.volume) not in seen:
+        seen.add(id(picture.volume))
+        yield from _nested(f"{name}.volume", _volume(picture.volume, values.BRIGHTEST, signed=False))
 
 
 def _nested(prefix: str, found: Found) -> Found:
@@ -241,6 +257,13 @@ def _phase(medium: Any, phase: records.PhaseFunction, put: Put, path: tuple[str,
         check = values.phase_values(phase.table)
         shown = values.shown_values
         yield "values", Parameter(medium, phase.table, check, lambda m, v: inner(m, table=v), shown)
+    elif isinstance(phase.flakes, records.GridVolume):
+        volume = phase.flakes
+        assert isinstance(volume.grid, DenseGrid)
+        data = volume.grid.values
+        yield "S.data", Parameter(volume, data, values.flake_samples, values.with_samples, values.frozen)
+    elif phase.flakes is not None:
+        yield "S", Parameter(medium, phase.flakes, values.flakes, lambda m, v: inner(m, flakes=v))
 
 
 _BSDF_NUMBERS = {"alpha", "alpha_u", "alpha_v"}
@@ -294,7 +317,7 @@ def _bsdf(bsdf: Any, seen: set[int], most: float = 1.0) -> Found:
             yield f"{_NESTED.get(name, name)}.data", _field(value, "pixels", check, values.frozen)
 
 
-def _emitter(emitter: records.Emitter, _seen: set[int]) -> Found:
+def _emitter(emitter: records.Emitter, seen: set[int]) -> Found:
     match emitter:
         case records.ConstantEmitter():
             yield "radiance.value", _colour(emitter, "radiance", values.BRIGHTEST)
@@ -312,19 +335,21 @@ def _emitter(emitter: records.Emitter, _seen: set[int]) -> Found:
             yield "position", _field(emitter, "position", values.point)
         case records.SpotEmitter():
             yield "intensity.value", _colour(emitter, "intensity", values.MOST_INTENSE)
+            if emitter.texture is not None:
+                yield from _picture("texture", emitter.texture, seen)
             for name in ("cutoff_angle", "beam_width"):
                 yield name, _field(emitter, name, values.number(0.0, 180.0))
             yield "to_world", _field(emitter, "to_world", values.matrix(values.unstretched), values.frozen)
         case records.ProjectorEmitter():
-            yield from _projector(emitter)
+            yield from _projector(emitter, seen)
 
 
-def _projector(emitter: records.ProjectorEmitter) -> Found:
+def _projector(emitter: records.ProjectorEmitter, seen: set[int]) -> Found:
     picture = emitter.irradiance
     if isinstance(picture, tuple):
         yield "irradiance.value", _colour(emitter, "irradiance", values.BRIGHTEST)
-    elif isinstance(picture, materials.Bitmap):
-        yield "irradiance.data", _field(picture, "pixels", values.bright_texels, values.frozen)
+    else:
+        yield from _picture("irradiance", picture, seen)
     yield "scale", _field(emitter, "scale", values.number(0.0, values.LARGEST_SCALE))
     yield "x_fov", _field(emitter, "x_fov", values.number(0.0, 180.0, exclusive=True))
     yield "to_world", _field(emitter, "to_world", values.matrix(values.unstretched), values.frozen)

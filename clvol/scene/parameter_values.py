@@ -13,6 +13,7 @@ from clvol.base.masks import as_array, masked_count
 from clvol.errors import SceneError, shown
 from clvol.scene import records
 from clvol.scene.emitter import LARGEST_SCALE, MOST_INTENSE, check_radiance
+from clvol.scene.flakes import fault_of_flakes, fault_of_matrix
 from clvol.scene.image import image_from_array
 from clvol.scene.medium_facts import channels_of
 from clvol.scene.reader import BRIGHTEST, ROUNDING, range_in_words
@@ -239,6 +240,27 @@ def samples(channels: int, maximum: float, signed: bool) -> Check:
         return grid.values if channels > 1 else grid.values[..., 0]
 
     return check
+
+
+def flake_samples(value: Any, name: str) -> np.ndarray:
+    """The matrices of an sggx, [z, y, x, 6]."""
+    grid = dense_from_array(_array(value, name), source=name, channels=(6,))
+    if grid.channels != 6:
+        raise SceneError("must have 6 channels, got 1", name)
+    if fault := fault_of_flakes(grid):
+        raise SceneError(f"S of an sggx {fault}", name)
+    return grid.values
+
+
+def flakes(value: Any, name: str) -> tuple[float, ...]:
+    """The six numbers of an sggx."""
+    six = _array(value, name).astype(np.float64).reshape(-1)
+    if len(six) != 6:
+        raise _wrong(name, "six numbers", value)
+    numbers = tuple(six.tolist())
+    if fault := fault_of_matrix(numbers):
+        raise SceneError(f"S of an sggx {fault}", name)
+    return numbers
 
 
 def with_samples(volume: records.GridVolume, data: np.ndarray) -> records.GridVolume:
