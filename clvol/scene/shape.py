@@ -155,7 +155,7 @@ def _shape(reader: Reader, kind: str, to_world: np.ndarray, triangles: Mesh | No
         exterior=media.get("exterior"),
         bsdf=made_of,
         emission=emission,
-        flip_normals=reader.boolean("flip_normals", False),
+        flip_normals=not reader.type.endswith("curve") and reader.boolean("flip_normals", False),
         mesh=triangles,
         name=reader.node.id,
         meter=_meter(reader, kind, to_world, triangles),

@@ -87,7 +87,8 @@ SHAPE = {
     "silhouette_sampling_weight": Silent(2.0),
     "vertex_a": Silent(TEXTURE),  # for mesh_attribute textures
 }
-STRANDS = {name: value for name, value in SHAPE.items() if name not in ("interior", "exterior")}
+_NO_STRANDS = ("interior", "exterior", "flip_normals")
+STRANDS = {name: value for name, value in SHAPE.items() if name not in _NO_STRANDS}
 STRANDS["filename"] = "b.txt"
 MESH = SHAPE | {"face_normals": True}
 DIELECTRIC = {

@@ -154,6 +154,12 @@ def test_curves_are_seen_from_outside_alone_and_bound_no_medium(load):
         load(STRAIGHT, interior={"type": "homogeneous"})
 
 
+def test_curves_are_not_turned_inside_out(load):
+    """As in Mitsuba, which does not know the parameter there."""
+    with pytest.raises(Error, match="unknown parameter 'flip_normals' of shape 'bsplinecurve'"):
+        load(STRAIGHT, flip_normals=True)
+
+
 def test_curves_are_no_meters(load):
     with pytest.raises(Error, match="an irradiancemeter on curves") as told:
         load(STRAIGHT, meter={"type": "irradiancemeter"})
