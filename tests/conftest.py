@@ -1,5 +1,6 @@
 """Fixtures every test may use: the device under test, and where the real volumes are."""
 
+import functools
 import os
 import re
 import signal
@@ -56,6 +57,22 @@ def independent_samples():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(auto, "DEFAULT_SAMPLER", "independent")
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def colours_are_read_once():
+    """The colour configuration that is built in is opened once, and not anew for every PNG."""
+    from clvol.picture import view_transform
+
+    opened = view_transform._config
+    kept = functools.cache(opened)
+
+    def config(name):
+        return (kept if name == view_transform.BUILT_IN else opened)(name)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(view_transform, "_config", config)
         yield
 
 

@@ -156,6 +156,7 @@ def kill_while_rendering(client, which, expected):
     assert done
 
 
+@pytest.mark.contract
 def test_a_worker_that_is_killed_costs_no_sample_and_no_bit(expected):
     with cluster() as workers, distributed.Client(workers) as client:
         kill_while_rendering(client, [0], expected)

@@ -51,6 +51,7 @@ def test_a_list_of_devices_has_the_bits_of_merge(four_ranges):
         assert result.stats[name] == whole.stats[name], name
 
 
+@pytest.mark.contract
 def test_devices_of_one_kind_have_the_same_bits_together_and_alone():
     if "Portable Computing Language" not in list_devices()[0].platform:
         pytest.skip("only PoCL can be told to have several devices on one processor")

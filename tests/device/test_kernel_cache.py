@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
+from tiers import quick_first
 
 import clvol
 from clvol.device import kernel_cache
@@ -77,7 +78,7 @@ def test_a_file_cut_short_is_told_from_a_whole_one(built, tmp_path, kind, cut):
         assert not is_whole(str(copy))
 
 
-@pytest.mark.parametrize(("kind", "cut"), [("generate_kernel.so", empty), ("program.bc", half)])
+@quick_first(("kind", "cut"), [("generate_kernel.so", empty), ("program.bc", half)])
 def test_a_cache_file_cut_short_is_built_anew(built, tmp_path, kind, cut):
     """Loaded unchecked, either ends the process with SIGABRT, in every later render."""
     cache = tmp_path / "cache"

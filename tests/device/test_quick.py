@@ -2,9 +2,11 @@
 
 import signal
 
+import every_bit
 import numpy as np
 import pytest
 from places import ROOT
+from tiers import quick_first
 
 import clvol
 from clvol.base.interrupts import interruptible, renew
@@ -60,13 +62,14 @@ def test_another_driver_may_build_other_arithmetic(pocl, monkeypatch):
     assert unoptimised(quick.StageUnits.of(pocl, UNITS, 1)) == set()
 
 
-def picture(**options):
-    result = clvol.render(clvol.load_file(ROOM, res=12), spp=4, seed=3, sampler="joint", **options)
-    return np.concatenate([result.image.ravel(), result.variance.ravel()])
+@quick_first("described", [every_bit.scene, lambda: clvol.load_file(ROOM, res=12)], ids=["media", "room"])
+def test_bits_are_the_same_and_kernels_change_amid_a_render(pocl, monkeypatch, caplog, described):
+    """Media that overlap, or surfaces; several lights; the whole of a small render, and half of one."""
 
+    def picture(**options):
+        result = clvol.render(described(), spp=4, seed=3, sampler="joint", **options)
+        return np.concatenate([result.image.ravel(), result.variance.ravel()])
 
-def test_bits_are_the_same_and_kernels_change_amid_a_render(pocl, monkeypatch, caplog):
-    """Surfaces, media, several lights; the whole of a small render, and half of one."""
     monkeypatch.setattr(quick, "SAMPLES", 0)
     expected = picture()
     monkeypatch.setattr(quick, "SAMPLES", 1 << 15)

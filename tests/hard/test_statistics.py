@@ -36,7 +36,9 @@ def scene():
 
 @functools.cache
 def pictures(sampler, spp):
-    """Means and their variances, of pixels and seeds."""
+    """Means and their variances, of pixels and seeds; first the most samples, whose kernels serve fewer."""
+    if spp < 16:
+        pictures(sampler, 16)
     results = [
         clvol.render(
             scene(), spp=spp, seed=90 + n, sampler=sampler, technique="regular", transmittance="ratio"

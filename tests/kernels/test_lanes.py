@@ -9,7 +9,7 @@ from lane_walks import lane_walks
 from probe import Probe, medium_of, scene_of
 from scipy import stats
 from stat_tests import FALSE_ALARM, largest_z, require_precision, sidak, z_score
-from tiers import quick_first
+from tiers import quick_first, quick_where
 from walks import collision_p_value, exact_depth, probes_of, scene_with
 
 from clvol.accel import costs
@@ -214,7 +214,7 @@ def test_streams_of_two_seeds_share_no_run_of_numbers(device):
 
 
 @pytest.mark.parametrize("sampler", registry.SAMPLERS)
-@pytest.mark.parametrize("lanes", WIDTHS)
+@quick_where("lanes", WIDTHS, (8).__eq__)
 def test_lanes_decide_by_the_numbers_that_paths_alone_decide_by(device, sampler, lanes):
     keys = np.random.default_rng(8).integers(0, 1 << 13, (64, 4), dtype=np.uint32)
     alone, together = (np.empty((64, 4), np.uint32) for _ in range(2))

@@ -13,6 +13,7 @@ from pictures import gauss, hg, hg_value
 from probe import Probe, medium_of, scene_of
 from sampling import DRAWS, uniform_p_value, uniforms
 from stat_tests import FALSE_ALARM, image_mean, largest_z, z_score
+from tiers import quick_where
 
 import clvol
 from clvol import layout
@@ -42,6 +43,7 @@ MIXTURES = {
     "only the first": BlendPhase(0.0, hg(0.5), RAYLEIGH),
     "only the second": BlendPhase(1.0, hg(0.5), RAYLEIGH),
 }
+QUICK = "a table of a sharp peak", "tables and another", "rayleigh", "two of a kind", "nested"
 GS = [0.0, 1e-4, -1e-4, 0.5, -0.7, 0.99, -0.99, 0.999999, -0.999999]
 
 
@@ -226,7 +228,7 @@ def test_rayleigh_directions_are_inverted_to_float_precision_from_both_poles(hg_
 # -- mixtures ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", MIXTURES)
+@quick_where("name", MIXTURES, QUICK.__contains__)
 def test_directions_of_a_mixture_follow_its_phase_function(device, name):
     phase = MIXTURES[name]
     x, azimuth, pdf, evaluated = sampled_phase(phase_probe(device, phase))
@@ -253,7 +255,7 @@ def kinks(phase):
     return [c for c in cosines if -1 < c < 1 - 1e-4]
 
 
-@pytest.mark.parametrize("name", MIXTURES)
+@quick_where("name", MIXTURES, QUICK.__contains__)
 def test_a_mixture_integrates_to_one(device, name):
     edges = np.unique(np.append(1 - np.geomspace(2, 1e-4, 41), kinks(MIXTURES[name])))
     cosine, w = (a.ravel() for a in gauss(edges[:-1], edges[1:], 8))

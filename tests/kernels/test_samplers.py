@@ -364,8 +364,9 @@ def filter_probe(request, device):
 def test_pixel_offsets_follow_the_filter_cut_at_the_films_edge(filter_probe, sample_border, pixel, pixels):
     rfilter, probes = filter_probe
     out = np.zeros(DRAWS, np.float32)
-    body = RANDOM + f"float weight = 1.0f; out0[i] = filter_offset(scene, k.x, {pixel}, {pixels}, &weight);"
-    probes[sample_border].run(["stages/generate.h"], body, [out], stage="generate")
+    body = RANDOM + "float weight = 1.0f; out0[i] = filter_offset(scene, k.x, in0[0], in0[1], &weight);"
+    place = np.array([pixel, pixels], np.uint32)
+    probes[sample_border].run(["stages/generate.h"], body, [out], [place], stage="generate")
     offset = out.astype(float) - 0.5  # from the pixel's centre
     edges = np.linspace(-rfilter.radius, rfilter.radius, 65)
     if not sample_border:

@@ -30,6 +30,7 @@ from clvol.planning import registry
 WALKS = 1 << 16
 TECHNIQUES, TRANSMITTANCES = unbiased("technique"), unbiased("transmittance")
 GREY_CASES = len(FIELDS) * len(RAYS)
+STOCHASTIC = "delta", "weighted-decomposition", "ratio", "residual-ratio"
 CHROMATIC_RAYS = ("oblique", "on a cell's face")
 
 
@@ -46,9 +47,11 @@ def combinations(family):
 
 
 def is_quick(combination):
-    """Of every technique or transmittance two: with a grid, and stochastic look-ups with a tree."""
-    _, majorant, lookup = combination
-    return (majorant == "grid" and lookup == "exact") or (majorant == "kdtree" and lookup == "stochastic")
+    """All with a grid; those of `STOCHASTIC` with stochastic look-ups over a tree, too."""
+    name, majorant, lookup = combination
+    if lookup == "exact":
+        return majorant == "grid"
+    return majorant == "kdtree" and name in STOCHASTIC
 
 
 def chromatic_combinations(family):
@@ -256,7 +259,7 @@ def test_small_transmittances_survive_roulette(device, transmittance):
 
 
 @pytest.mark.parametrize("rule", registry.PROBABILITIES)
-@pytest.mark.parametrize("technique", ["spectral", "spectral-decomposition"])
+@quick_first("technique", ["spectral-decomposition", "spectral"])
 def test_every_rule_serves_a_constant_medium_of_three_colours(device, technique, rule):
     """Where the control is the whole majorant of the densest channel, the others still need null events."""
     values = np.full((9, 8, 10), 0.7, np.float32)
@@ -304,6 +307,7 @@ def test_a_power_series_survives_thick_media(device, depth):
     assert np.isfinite(estimates).all()
 
 
+@pytest.mark.contract
 def test_marching_is_biased_until_its_steps_are_fine(device):
     """The exp of a noisy sum is too large on the mean: the baseline shows it."""
     ray, length = RAYS["oblique"], exit_distance(*RAYS["oblique"])

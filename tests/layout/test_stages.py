@@ -279,7 +279,9 @@ def test_what_a_contract_does_not_name_does_not_compile(device, monkeypatch, sta
 @quick_first("name", CASES)
 def test_a_launch_moves_paths_and_writes_values_as_its_contract_says(device, monkeypatch, name):
     described, choices = CASES[name]
-    session = Session.for_scene(device, described(), Choices(majorant="grid", **choices), 0, pool=256)
+    made = described()
+    plan = Plan.of(made, Choices(majorant="grid", **choices))
+    session = Session.for_plan(device, made, plan, 0, pool=256, spp=4)
     waves, launch = session.wavefront, cl.enqueue_nd_range_kernel
     value_of = [declared.name for declared in layout.PATH_STATE for _ in declared.fields(session.plan.macros)]
     moved, written = {stage: set() for stage in NAMES}, {stage: set() for stage in NAMES}

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pictures import box, gridded, homogeneous, picture, volume
 from stat_tests import assert_same_picture
+from tiers import quick_first
 
 import clvol
 from clvol import render
@@ -105,7 +106,7 @@ def test_what_cannot_be_right_is_refused_with_a_reason_and_a_way_out(described, 
     assert why in str(caught.value) and instead in str(caught.value)
 
 
-@pytest.mark.parametrize(("technique", "transmittance"), [("marching", "ratio"), ("delta", "marching")])
+@quick_first(("technique", "transmittance"), [("marching", "ratio"), ("delta", "marching")])
 def test_marching_says_that_it_is_biased_and_a_fine_step_is_near_the_truth(technique, transmittance, caplog):
     thick = scene((30.0,))
     with caplog.at_level(logging.WARNING, "clvol"):
@@ -148,7 +149,7 @@ def said_in_fog(sigma_t, **choices):
     return list(warnings(plan, choices)), image
 
 
-@pytest.mark.parametrize(
+@quick_first(
     ("sigma_t", "choices", "family", "names"),
     [
         (1.0, {}, "transmittance", ("none", "ratio")),
@@ -159,6 +160,7 @@ def said_in_fog(sigma_t, **choices):
         (1.0, {}, "majorant", ("global", "grid")),
         ((1.0, 2.0, 3.0), {}, "probability", ("history", "max")),
     ],
+    count=3,
 )
 def test_what_is_said_to_have_no_use_changes_nothing_and_nothing_else_does(sigma_t, choices, family, names):
     """Each pair of choices makes two pictures unless the second is said not to be used."""
@@ -226,7 +228,7 @@ def test_choices_are_checked_when_they_are_made():
     assert Choices(aov="cells").aov == ("cells",)
 
 
-@pytest.mark.parametrize("majorant", ["global", "grid", "kdtree"])
+@quick_first("majorant", ["grid", "global", "kdtree"])
 def test_a_majorant_scaled_down_is_violated_and_counted(majorant):
     low, sound = (
         clvol.render(

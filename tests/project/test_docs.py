@@ -137,6 +137,7 @@ def test_the_table_lists_every_aov(aov: str) -> None:
     assert f"`{aov}`" in table
 
 
+@pytest.mark.contract
 def test_the_first_examples_run_in_turn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     examples = re.findall(r"```python\n(.*?)```", text_of("getting-started.md"), re.DOTALL)
     (tmp_path / "scenes").symlink_to(SCENES, target_is_directory=True)

@@ -25,6 +25,7 @@ def cloud() -> np.ndarray:
     return np.frombuffer(data, "<f4", offset=48).reshape(128, 128, 128)
 
 
+@pytest.mark.contract
 def test_script_reproduces_the_committed_cloud_bit_for_bit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

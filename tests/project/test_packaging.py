@@ -121,6 +121,7 @@ def test_a_wheel_without_kernels_would_be_noticed(installed: Path, tmp_path: Pat
         compose(tmp_path, broken)
 
 
+@pytest.mark.contract
 def test_editable_install_reads_the_kernels_of_its_checkout(source: Path, tmp_path: Path) -> None:
     site, elsewhere = tmp_path / "site", tmp_path / "elsewhere"
     elsewhere.mkdir()
@@ -129,6 +130,7 @@ def test_editable_install_reads_the_kernels_of_its_checkout(source: Path, tmp_pa
     assert compose(elsewhere, site) == source / "clvol" / "__init__.py"
 
 
+@pytest.mark.contract
 def test_source_distribution_holds_what_its_tests_need(tmp_path: Path) -> None:
     checkout = tmp_path / "checkout"
     left_out = shutil.ignore_patterns(

@@ -74,7 +74,8 @@ def test_alpha_is_one_less_the_transmittance_in_every_technique(scale, technique
     assert_alpha(alpha_of(slab(layered(scale)), technique=technique), expected)
 
 
-@quick_first(("background", "lanes"), [("sampled", "8"), ("expected", "8"), ("expected", "off")])
+@pytest.mark.contract
+@pytest.mark.parametrize(("background", "lanes"), [("sampled", "8"), ("expected", "8"), ("expected", "off")])
 def test_alpha_in_lanes_and_where_walks_expect_the_background(background, lanes):
     options = {"technique": "delta", "background": background, "lanes": lanes, "majorant_scale": 2.0}
     result = clvol.render(slab(layered()), spp=1 << 14, seed=7, **options)
@@ -90,6 +91,7 @@ def test_walks_of_several_legs_count_once(bounds, background):
     assert_alpha(found, 1 - np.exp(-3 * DEPTH))
 
 
+@pytest.mark.contract
 def test_alpha_of_media_that_overlap():
     found = alpha_of(slab(layered(), homogeneous(0.2, 0.9), layered(0.5)))
     assert_alpha(found, 1 - np.exp(-1.5 * DEPTH - 0.4))
@@ -126,6 +128,7 @@ def test_over_the_background_it_is_the_picture_with_it():
     assert (cut.alpha[0] == 0).all() and (cut.image[0] == 0).all() and cut.alpha.max() > 0.3
 
 
+@pytest.mark.contract
 def test_filters_with_negative_parts_leave_empty_pixels_empty():
     scene = cut_out(picture([box(*CUBE, layered())], [SKY], (0, 0, -8), (0, 0, 0), 40.0, (12, 12)))
     lanczos = replace(scene, film=replace(scene.film, rfilter=ReconstructionFilter("lanczos", 3.0, 0.0)))
@@ -155,6 +158,7 @@ def test_parts_merge_with_their_alpha():
     np.testing.assert_allclose(clvol.merge(parts).alpha, whole.alpha, rtol=1e-6)
 
 
+@pytest.mark.contract
 def test_renders_to_a_target_error_have_alpha():
     found = clvol.render(slab(layered(), max_depth=2), target_error=0.01, seed=1)
     assert found.metadata["spp"] > 100 and abs(found.alpha.mean() / (1 - np.exp(-DEPTH)) - 1) < 0.05
@@ -171,8 +175,8 @@ def test_it_costs_nothing_where_it_is_not_asked_for():
     assert "result_firsts" not in {argument.name for argument in layout.arguments(macros)}
 
 
-@pytest.mark.parametrize("colour", [(0.6,), (0.1, 0.2, 0.4)])
-@pytest.mark.parametrize("lights", [[SKY, SUN], [SUN]], ids=["sky", "no sky"])
+@quick_first("colour", [(0.1, 0.2, 0.4), (0.6,)])
+@quick_first("lights", [[SKY, SUN], [SUN]], ids=["sky", "no sky"])
 def test_a_backdrop_is_seen_and_lights_nothing(colour, lights):
     scene = picture([box(*CUBE, layered())], lights, (0.4, 0.5, -4.0), (0, 0, 0), 90.0, (8, 8))
     options = {"spp": 16, "technique": "delta", "seed": 3}

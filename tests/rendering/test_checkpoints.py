@@ -38,7 +38,7 @@ def same(one, other):
         assert one.stats[name] == other.stats[name], name
 
 
-@pytest.fixture(scope="module", params=["sobol", "independent"])
+@pytest.fixture(scope="module", params=["sobol", pytest.param("independent", marks=pytest.mark.contract)])
 def whole(request):
     return request.param, rendered(scene(), spp=SPP, seed=SEED, sampler=request.param, aov=AOVS)
 

@@ -12,6 +12,7 @@ import sys
 import pytest
 from long_walks import endless, scene_of
 from stat_tests import assert_same_picture
+from tiers import quick_first
 
 import clvol
 from clvol.planning.choices import Choices
@@ -81,7 +82,7 @@ def levels(*changes):
     return level
 
 
-@pytest.mark.parametrize("kind", ["voxel", "majorant", "albedo"])
+@quick_first("kind", ["voxel", "majorant", "albedo"])
 def test_the_host_is_asked_after_a_bounded_number_of_steps(device, kind):
     """No launch is longer than a stage's bound and a leg of each walk at hand, in both tracking stages."""
     session = session_of(device, kind)
@@ -105,6 +106,7 @@ def test_the_host_is_asked_after_a_bounded_number_of_steps(device, kind):
     assert least.calls[0] < 30
 
 
+@pytest.mark.contract
 def test_a_second_interrupt_keeps_finished_passes_and_leaves_nothing_behind(device):
     session = session_of(device, "sheets", pool=None)
     finished = []

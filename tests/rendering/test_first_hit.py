@@ -5,6 +5,7 @@ import pytest
 from fields import FIELDS
 from pictures import ball, camera_rays, gridded, homogeneous, picture, volume
 from stat_tests import largest_z
+from tiers import quick_first
 
 import clvol
 from clvol.scene.materials import Dielectric, Diffuse, Plastic
@@ -48,7 +49,7 @@ def test_coats_show_their_base_glass_its_tint_and_nothing_shows_zero():
         assert (result.aovs[name][0] == 0).all()
 
 
-@pytest.mark.parametrize("technique", ["delta", "spectral", "regular"])
+@quick_first("technique", ["delta", "spectral", "regular"])
 def test_media_show_their_first_collisions_in_every_technique(technique):
     values = FIELDS["ramp"]()
     medium = gridded(volume(values, (-1, -1, -1), (1, 1, 1)), RED, scale=(0.5, 1.0, 2.0))

@@ -65,17 +65,17 @@ def of_tetrahedron():
 @quick_first(
     ("name", "shape", "expected"),
     [
+        ("upright", {"type": "disk", "to_world": clvol.rotate([1, 0, 0], 90)}, 0.5),
+        ("mesh", TETRAHEDRON, of_tetrahedron()),
         ("rectangle", {"type": "rectangle"}, 1.0),
         ("downwards", {"type": "rectangle", "flip_normals": True}, 0.0),
         ("mirrored", {"type": "rectangle", "to_world": MIRRORED}, 1.0),
-        ("upright", {"type": "disk", "to_world": clvol.rotate([1, 0, 0], 90)}, 0.5),
         ("slanted", {"type": "disk", "to_world": clvol.rotate([1, 0, 0], 60)}, 0.75),
         ("sphere", {"type": "sphere", "radius": 3.0}, 0.5),
         ("cylinder", {"type": "cylinder"}, 0.5),
-        ("mesh", TETRAHEDRON, of_tetrahedron()),
         ("cube", {"type": "cube", "to_world": clvol.scale([2, 1, 0.5])}, (8 * 0.5 + 6 * 0.5) / 14),
     ],
-    count=4,
+    count=2,
 )
 def test_under_half_a_sky_it_is_by_the_angle_of_the_normals(name, shape, expected):
     """Of a plane at an angle a: (1 + cos a) / 2."""

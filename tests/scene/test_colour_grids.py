@@ -23,7 +23,10 @@ STORED = {
 }
 
 
-@pytest.fixture(params=STORED)
+OTHERS = [pytest.param(way, marks=pytest.mark.contract) for way in STORED if way not in ("vec3s", "Vec3f")]
+
+
+@pytest.fixture(params=["vec3s", "Vec3f", *OTHERS])
 def file(request, tmp_path) -> str:
     """A density, and colours in each way of storing them: halves, quarters and eighths."""
     options = {"value_type": "vec3s", "transform": UNIT} | STORED[request.param]

@@ -73,7 +73,7 @@ def test_a_technique_that_is_asked_for_is_taken_with_a_warning(technique, made, 
     assert "differ by 1 : 1e+06" in caplog.text and "a path for each channel" in caplog.text
 
 
-@pytest.mark.parametrize("technique", ["spectral", "spectral-decomposition", "regular"])
+@quick_first("technique", ["spectral", "spectral-decomposition", "regular"])
 def test_the_guess_of_the_background_does_not_drown_a_thin_channel(technique):
     """Where the dense channels are thin enough to be seen through, one path does show all three."""
     depths = 10.0, 5.0, 1e-5

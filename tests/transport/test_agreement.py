@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from pictures import ball, box, gridded, hg, picture, unit, volume
 from stat_tests import assert_same_picture, image_mean
+from tiers import quick_first
 
 from clvol import render
 from clvol.accel.bounds import with_slack
@@ -77,6 +78,7 @@ def test_absorption_by_event_and_by_weight_show_the_picture_of_the_mixture(absor
     assert_same_picture(reference(), other)
 
 
+@pytest.mark.contract
 def test_a_uniform_sky_is_the_same_with_and_without_light_sampling():
     sampled = cloud_picture(SKY_AND_DARK_SUN, transmittance="ratio", seed=4)
     found = cloud_picture(SKY, transmittance="none", seed=5)
@@ -114,7 +116,7 @@ def test_a_bias_of_one_tile_is_rejected():
         assert_same_picture(reference(), biased)
 
 
-@pytest.mark.parametrize("majorant", ["global", "grid", "kdtree"])
+@quick_first("majorant", ["global", "grid", "kdtree"])
 def test_a_majorant_ten_percent_too_low_is_caught_by_count_and_by_picture(majorant, monkeypatch):
     reference()  # before anything is broken
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from pictures import assert_matches, box, gridded, picture, volume
 from stat_tests import assert_same_picture, seed_of
+from tiers import quick_first
 
 import clvol
 from clvol import render
@@ -95,7 +96,7 @@ def test_walks_of_several_legs_neither_lose_nor_double_it(bounds, way):
     assert_same_picture(result, shown("sampled", limits=(("scale", 5.0),), **WAYS[0]))
 
 
-@pytest.mark.parametrize("limits", [{"max_depth": 2}, {"hide_emitters": True}], ids=["depth", "hidden"])
+@quick_first("limits", [{"max_depth": 2}, {"hide_emitters": True}], ids=["depth", "hidden"])
 def test_limits_of_depth_and_hidden_emitters_hold(limits):
     one, other = (shown(name, limits=tuple(limits.items()), **WAYS[0]) for name in ("expected", "sampled"))
     assert_same_picture(one, other)

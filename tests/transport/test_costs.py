@@ -135,15 +135,11 @@ def test_a_limit_of_depth_leaves_no_background():
     assert (render(scene, spp=4, technique="spectral").image == 0).all()
 
 
-def test_with_other_rules_weights_do_exceed_it():
+@quick_first("rule", ["max", "average"])
+def test_with_other_rules_weights_do_exceed_it(rule):
     """The same scene: what `history` is there for."""
-    largest = {
-        rule: render(
-            chromatic_scene((0.99, 0.9, 0.999)), spp=64, technique="spectral", probability=rule
-        ).stats["largest_weight"]
-        for rule in ("max", "average")
-    }
-    assert min(largest.values()) > 10
+    result = render(chromatic_scene((0.99, 0.9, 0.999)), spp=64, technique="spectral", probability=rule)
+    assert result.stats["largest_weight"] > 10
 
 
 def test_counts_of_a_render_add_up():

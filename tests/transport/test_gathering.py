@@ -65,7 +65,7 @@ def test_the_emission_of_layers_is_that_of_quadrature(gathering, colours):
     assert_matches(layered(gathering, colours), emitted(SCALES[colours]), bias=0.03)
 
 
-@pytest.mark.parametrize("colours", SCALES)
+@quick_first("colours", SCALES)
 def test_strata_have_a_fraction_of_the_noise(colours):
     noise = {name: float(layered(name, colours).noise) for name in GATHERINGS}
     assert noise["strata"] < (0.5 if colours == "grey" else 0.8) * noise["collision"]
@@ -95,7 +95,8 @@ def lumpy(**options):
     return render(lumps(), spp=1 << 11, seed=seed_of("lumpy", *options.values()), **options)
 
 
-@quick_first(
+@pytest.mark.contract
+@pytest.mark.parametrize(
     "options",
     [
         {"gathering": "collision"},

@@ -161,20 +161,17 @@ def test_half_a_percent_would_show_in_the_layers_of_all_techniques(scale):
     assert_pooled([(layered(t, scale, majorant="grid"), answer(scale)) for t in TECHNIQUES])
 
 
-@pytest.mark.parametrize("lanes", ["8", pytest.param("off", marks=pytest.mark.contract)])
+@pytest.mark.contract
+@pytest.mark.parametrize("lanes", ["8", "off"])
 def test_it_is_gathered_behind_walks_in_lanes(lanes):
     result = layered("delta", GREY, lanes=lanes, majorant="grid")
     assert result.metadata["lanes"] == lanes
     assert_matches(result, answer(GREY), bias=0.02)
 
 
-@pytest.mark.parametrize(
+@quick_first(
     ("technique", "scale", "lanes"),
-    [
-        ("delta", GREY, "8"),
-        ("spectral", COLOURED, "auto"),
-        pytest.param("regular", COLOURED, "auto", marks=pytest.mark.contract),
-    ],
+    [("delta", GREY, "8"), ("spectral", COLOURED, "auto"), ("regular", COLOURED, "auto")],
 )
 def test_legs_neither_lose_nor_double_it(bounds, technique, scale, lanes):
     bounds(WALK_STEPS=2)

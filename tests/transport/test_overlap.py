@@ -168,13 +168,16 @@ def test_no_bias_is_shared_by_all_techniques(pictures, kind):
 
 
 def test_a_medium_that_is_not_added_is_noticed():
+    """Of one that is a tenth thinner the picture is its own, and not that of the whole one."""
     layers = Layers("grey")
     layers.scales = (*layers.scales[:2], (0.9 * layers.scales[2][0],))
     result = once(layers, technique="delta", transmittance="ratio")
+    assert_matches(result, layers.answer(4.0), bias=0.01)
     with pytest.raises(AssertionError, match="deviates"):
         assert_matches(result, Layers("grey").answer(4.0), bias=0.01)
 
 
+@pytest.mark.contract
 def test_weights_that_are_not_multiplied_are_noticed(monkeypatch):
     """The walk that wins keeps its own weight alone; without any repetition the mean stays right."""
     original = programs.kernel_source

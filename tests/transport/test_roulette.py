@@ -32,10 +32,10 @@ def hohlraum(make, rr_depth):
     return make([wall, ball((0, 0, 0), 1.0, smoke)], lights=(), rr_depth=rr_depth, **views)
 
 
-def pictured(make, rr_depth, roulette):
+def pictured(make, rr_depth, roulette, spp=1 << 11):
     choices = {"transmittance": "none"} if make is found else {"transmittance": "ratio"}
     scene = hohlraum(make, rr_depth)
-    return render(scene, spp=1 << 11, seed=3, absorption="weight", roulette=roulette, **choices)
+    return render(scene, spp=spp, seed=3, absorption="weight", roulette=roulette, **choices)
 
 
 @pytest.mark.contract
@@ -64,7 +64,7 @@ def test_survivors_that_do_not_stand_for_the_others_are_caught(monkeypatch):
 def test_weight_ends_paths_that_depth_would_follow():
     """No path leaves the sphere: below rr_depth weight ends what depth follows."""
     followed, ended = (
-        pictured(found, 8, roulette).stats["real_collisions"] for roulette in ("depth", "weight")
+        pictured(found, 8, roulette, spp=128).stats["real_collisions"] for roulette in ("depth", "weight")
     )
     assert ended < 0.6 * followed
 

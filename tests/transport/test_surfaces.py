@@ -200,6 +200,7 @@ def test_a_spherical_lamp_lights_a_floor_as_its_closed_form():
     assert_matches(show(scene, spp=1 << 13, seed=6), answer[..., None])
 
 
+@pytest.mark.contract
 def test_a_point_light_through_a_pane_and_round_an_opaque_sphere():
     """A thin pane passes (1 - R) / (1 + R) at its angle; behind the sphere there is nothing at all."""
     place = np.array([0.2, 1.2, 0.1])

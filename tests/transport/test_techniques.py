@@ -16,7 +16,6 @@ from pictures import assert_matches, assert_pooled, box, homogeneous, mean_and_e
 from scipy import stats
 from slabs import HALF_SPACES, SLABS, assert_a_white_slab_loses_nothing, graded_slab
 from stat_tests import FALSE_ALARM, largest_z, require_precision, seed_of, sidak, z_score
-from tiers import quick_first
 from walks import unbiased
 
 from clvol import render
@@ -252,7 +251,8 @@ def test_eight_tenths_of_a_percent_would_show_in_the_half_spaces_of_all_techniqu
     assert_pooled([picture for pair in PAIRS for picture in half_spaces(*pair)], bias=0.008)
 
 
-@quick_first(("technique", "transmittance"), PAIRS)
+@pytest.mark.contract
+@pytest.mark.parametrize(("technique", "transmittance"), PAIRS)
 def test_a_white_slab_loses_nothing(technique, transmittance):
     assert_a_white_slab_loses_nothing(technique, transmittance)
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from pictures import assert_matches, assert_pooled, box, picture, volume
 from stat_tests import seed_of
+from tiers import quick_first, quick_where
 from walks import unbiased
 
 from clvol import render
@@ -74,7 +75,7 @@ def test_half_a_percent_would_show_in_the_thin_media_of_all_techniques():
     assert_pooled([picture for case in CASES for picture in thin_media(*case)])
 
 
-@pytest.mark.parametrize(("factor", "bound"), [(0.14, 1.0), (0.58, 0.25)])
+@quick_first(("factor", "bound"), [(0.14, 1.0), (0.58, 0.25)])
 def test_a_walk_of_several_legs_gathers_no_part_of_a_thin_medium_twice(bounds, factor, bound):
     """Most of the depth in the first leg; also where a bound that does not hold makes it seem thin."""
     bounds(WALK_STEPS=2)
@@ -86,7 +87,7 @@ def test_a_walk_of_several_legs_gathers_no_part_of_a_thin_medium_twice(bounds, f
     assert_matches(result, emitted(profile, glow, (factor,)), bias=0.02)
 
 
-@pytest.mark.parametrize("colours", SCALES)
+@quick_where("colours", SCALES, "coloured".__eq__)
 def test_homogeneous_media_show_it_at_any_depth(colours):
     for factor in (1e-8, 0.1, 3.0):
         scale = tuple(factor * s for s in SCALES[colours])
@@ -102,7 +103,7 @@ def test_a_constant_emitter_that_nothing_attenuates_otherwise_has_no_noise():
     assert result.noise < 1e-6
 
 
-@pytest.mark.parametrize("colours", SCALES)
+@quick_first("colours", SCALES)
 def test_exact_flights_show_a_faint_part_of_a_medium_that_is_thick_elsewhere(colours):
     """No bound of the whole medium says that these rays meet next to nothing."""
     density, factor = np.ones((9, 4, 8)), 1e-8

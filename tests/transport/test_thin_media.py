@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from pictures import assert_mean, ball, box, camera_rays, gridded, homogeneous, picture, volume
 from surface_scenes import SKY, SPECK, mesh_box, surfaced
+from tiers import quick_first
 
 import clvol
 from clvol.scene.materials import Diffuse
@@ -59,7 +60,7 @@ def test_a_thin_slab_absorbs_and_emits_like_a_thick_one(kind, surfaces):
         assert_mean(rendered(scene), share + 3.0 * (1 - share))
 
 
-@pytest.mark.parametrize("surfaces", [False, True], ids=["alone", "surfaces"])
+@quick_first("surfaces", [False, True], ids=["alone", "surfaces"])
 def test_a_thin_ball_absorbs_like_a_thick_one(surfaces):
     for radius in (1e-5, 1e-6):
         scene = view([ball((0.0, 0.0, 0.0), radius, homogeneous(1 / radius))], surfaces, fov=2 * radius)
@@ -92,7 +93,7 @@ def opposite(offset):
     return surfaced(ball(tuple(-x for x in offset), SPECK), Diffuse((0.0,)))
 
 
-@pytest.mark.parametrize("kind", ["homogeneous", "grid"])
+@quick_first("kind", ["homogeneous", "grid"])
 def test_places_in_a_thin_slab_are_refused_where_rounding_takes_them(kind):
     """Far from the centre only: what scatters there would leave the slab by rounding alone."""
     offset = (0.0, 0.0, 4.0)

@@ -1,9 +1,9 @@
 """Pictures that projectors throw, on a floor and into fog, against closed forms and quadrature in float64."""
 
 import numpy as np
+import pytest
 from pictures import camera_rays
 from stat_tests import largest_z, require_precision, z_score
-from tiers import quick_first
 
 import clvol
 
@@ -71,7 +71,8 @@ def single_scattering(scene, sigma, albedo, nodes=1600):
     return means
 
 
-@quick_first("lanes", ["8", "off"])
+@pytest.mark.contract
+@pytest.mark.parametrize("lanes", ["8", "off"])
 def test_fog_shows_the_beam(lanes):
     sigma, albedo = 1.5, 0.8
     box = clvol.translate((0.5, 0.5, 0.5)) @ clvol.scale(0.5)

@@ -71,7 +71,7 @@ def furnace(pair, eye, lights=(), albedo=1.0, **integrator):
     )
 
 
-@pytest.mark.parametrize("eye", FURNACE_EYES)
+@quick_first("eye", FURNACE_EYES, count=2)
 @pytest.mark.parametrize("pair", [homogeneous_pair, gridded_pair])
 def test_furnace_without_light_sampling_is_one_to_the_last_bit(pair, eye):
     result = render(furnace(pair, eye), spp=4096, seed=1, transmittance="none", majorant="grid")
@@ -79,7 +79,7 @@ def test_furnace_without_light_sampling_is_one_to_the_last_bit(pair, eye):
     assert (result.variance == 0).all()
 
 
-@quick_first(("eye", "absorption"), FURNACES, count=2)
+@quick_first(("eye", "absorption"), FURNACES)
 def test_furnace_of_homogeneous_media_is_one(eye, absorption):
     scene = furnace(homogeneous_pair, eye, UNLIT, max_depth=UNREACHED_DEPTH)
     result = render(scene, spp=24576, seed=2, transmittance="ratio", absorption=absorption)
@@ -118,6 +118,7 @@ def test_slabs_reflect_and_transmit_what_is_published(albedo, g, thickness, refl
     assert abs(t - transmitted) < 3 * error[1], f"T = {t:.5f} ± {error[1]:.5f}, not {transmitted}"
 
 
+@pytest.mark.contract
 def test_an_isotropic_slab_is_told_from_a_slightly_forward_scattering_one():
     (r, t, _), error = mean_and_error(render(homogeneous_slab(1.0, 0.03, 1.0), spp=1 << 17, seed=4))
     assert abs(r - SLABS[1][3]) > 6 * error[0] and abs(t - SLABS[1][4]) > 6 * error[1]
@@ -285,6 +286,7 @@ def test_chromatic_single_scattering_is_the_quadrature_in_every_channel():
     assert_matches(render(scene, spp=1 << 18, seed=11), np.concatenate(channels, axis=-1), bias=0.01)
 
 
+@pytest.mark.contract
 def test_furnace_of_a_chromatic_medium_is_one_in_every_channel():
     scene = single_scattering(
         0.0, 0.0, (1.0, 0.999, 1.0), 1.2 * RGB, 1.0, RGB, 1.0, max_depth=UNREACHED_DEPTH
@@ -300,7 +302,7 @@ RAMPS = {  # albedo at the voxel centres along z, front to back
 }
 
 
-@pytest.mark.parametrize("absorption", ["sample", "mixed"])
+@quick_first("absorption", ["mixed", "sample"])
 def test_albedo_comes_from_grids_of_one_and_three_channels(absorption):
     """Light and view go along z through one cube of either kind: the answer is an integral over z."""
     shapes, expected = [], []

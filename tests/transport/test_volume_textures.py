@@ -173,6 +173,7 @@ def test_a_volume_of_normals_bends_the_frame_of_the_surfaces_coordinates():
     np.testing.assert_allclose(image, 0.9 / np.pi * (normal @ [0.6, 0.0, 0.8]), rtol=1e-5)
 
 
+@pytest.mark.contract
 def test_what_needs_a_number_or_a_colour_takes_a_volume():
     grey, coloured = texture_of(GREY), texture_of(COLOURS)
     for bsdf in (

@@ -1,5 +1,7 @@
 """Pictures whose walks go in lanes: as those of walks one by one, and of the same bits at every width."""
 
+import functools
+
 import numpy as np
 import pytest
 from every_bit import SPP, digest, rendered
@@ -77,20 +79,30 @@ def test_walks_in_lanes_and_one_by_one_show_the_same_picture(kind, transmittance
     assert_same_picture(one, many)
 
 
-@pytest.fixture(scope="module")
-def sixteen():
-    return rendered(cloud(), spp=SPP, seed=7, lanes="16")
+@functools.cache
+def sixteen(spp):
+    return digest(rendered(cloud(), spp=spp, seed=7, lanes="16"))
 
 
-@quick_first("options", [{"lanes": "4"}, {"lanes": "8"}, {"lanes": "16", "pool": 3000}], ids=str)
-def test_neither_their_number_nor_the_pool_touches_a_bit(sixteen, options):
-    assert digest(rendered(cloud(), spp=SPP, seed=7, **options)) == digest(sixteen)
+@quick_first(
+    ("options", "spp"),
+    [
+        ({"lanes": "4"}, 250),
+        ({"lanes": "4"}, SPP),
+        ({"lanes": "8"}, SPP),
+        ({"lanes": "16", "pool": 3000}, SPP),
+    ],
+    ids=str,
+)
+def test_neither_their_number_nor_the_pool_touches_a_bit(options, spp):
+    assert digest(rendered(cloud(), spp=spp, seed=7, **options)) == sixteen(spp)
 
 
-def test_groups_of_a_gpu_do_not_touch_a_bit(sixteen, monkeypatch):
-    tune = Plan.tune
+@pytest.mark.contract
+def test_groups_of_a_gpu_do_not_touch_a_bit(monkeypatch):
+    tune, expected = Plan.tune, sixteen(SPP)
     monkeypatch.setattr(Plan, "tune", lambda plan, _: tune(plan, Tuning(64, 512, lanes=4)))
-    assert digest(rendered(cloud(), spp=SPP, seed=7)) == digest(sixteen)
+    assert digest(rendered(cloud(), spp=SPP, seed=7)) == expected
 
 
 @pytest.mark.contract
@@ -157,13 +169,14 @@ def test_where_no_walk_goes_in_lanes_numbers_are_drawn_in_them():
     assert widths(Plan.of(cloud(), Choices(lanes="off"))) == {}
 
 
-@pytest.mark.parametrize("scene", [lambda: cloud(more=[BESIDE]), room], ids=["media", "room"])
+@quick_first("scene", [lambda: cloud(more=[BESIDE]), room], ids=["media", "room"])
 @pytest.mark.parametrize(
     "sampler", [s if s == "joint" else pytest.param(s, marks=pytest.mark.contract) for s in SAMPLERS]
 )
-def test_numbers_drawn_in_lanes_are_those_drawn_one_by_one(scene, sampler):
+@quick_first("lanes", ["16", "4"])
+def test_numbers_drawn_in_lanes_are_those_drawn_one_by_one(scene, sampler, lanes):
     """Of walks one by one, so that pictures have the same bits; roulette and absorption are drawn, too."""
     choices = {"technique": "weighted-delta", "transmittance": "regular", "sampler": sampler, "spp": 512}
-    off, *others = (rendered(scene(), lanes=lanes, seed=8, **choices) for lanes in ("off", "4", "16"))
-    assert all(np.array_equal(off.image, other.image) for other in others)
-    assert all(off.stats["lookups"] == other.stats["lookups"] for other in others)
+    off, drawn = (rendered(scene(), lanes=width, seed=8, **choices) for width in ("off", lanes))
+    assert np.array_equal(off.image, drawn.image)
+    assert off.stats["lookups"] == drawn.stats["lookups"]

@@ -13,7 +13,7 @@ from fields import exit_distance, optical_depth
 from probe import Probe, scene_of
 from sparse_grids import dense_of, grid_of, lumps, medium_of_grid, volume_of
 from stat_tests import FALSE_ALARM, largest_z, sidak, z_score
-from tiers import quick_first
+from tiers import quick_first, quick_where
 from trees import leaves_of
 from walks import BINS, collision_p_value, sample_walks, transmittance_walks, unbiased, weighted_z
 
@@ -133,7 +133,7 @@ def spread(bounds):
 BOUNDED = [*((name, None) for name in GRIDS), ("lumps", [(0, 0.25), (0.3, 0), (0.5, 4), (0.7, 0)])]
 
 
-@pytest.mark.parametrize(("name", "points"), BOUNDED)
+@quick_where(("name", "points"), BOUNDED, lambda case: case[1] or case[0] in ("tiles", "colours"))
 def test_bounds_without_arrays_over_the_box_are_those_with_them(monkeypatch, name, points):
     dense, tree = both(GRIDS[name], monkeypatch)
     transfer = points and transfer_of_points(points)
@@ -211,6 +211,7 @@ def test_look_ups_through_a_tree_have_the_same_bits(device, monkeypatch):
         assert (without == through).all() and len(np.unique(without)) > 100
 
 
+@pytest.mark.contract
 def test_a_picture_through_trees_has_the_same_bits(monkeypatch):
     """Every kind of volume, boxes that differ, colours, and a field that reaches beyond its box."""
     medium = Medium(
@@ -309,7 +310,7 @@ def trail(count, step):
 FAR = {"pair": far_pair(4088), "trail": trail(100, 1000), "farthest": far_pair(MOST_EXTENT - 24)}
 
 
-@pytest.mark.parametrize("name", FAR)
+@quick_where("name", FAR, "trail".__ne__)
 def test_memory_follows_what_a_volume_holds_and_not_its_box(name):
     """What is built for the device and on the way, in bytes: 8 bricks, some blocks and nodes a leaf."""
     grid = FAR[name]
