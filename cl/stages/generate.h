@@ -120,11 +120,11 @@ INLINE void start_job(const Scene *scene, uint slot, uint job, const Draws *draw
     const int width = scene->render->film_size[0];
     const int px = (int)(key.pixel % (uint)width), py = (int)(key.pixel / (uint)width);
     float weight = 1.0f;
+#if CLVOL_HAS_METER /* the place in the pixel alone, at full resolution: that in a large film has few digits */
+    set_meter_ray(scene, slot, uniform_float(k.x), uniform_float(k.y), uniform_below_one(k.z), uniform_float(k.w));
+#else
     const float x = (float)px + filter_offset(scene, k.x, px, width, &weight);
     const float y = (float)py + filter_offset(scene, k.y, py, scene->render->film_size[1], &weight);
-#if CLVOL_HAS_METER
-    set_meter_ray(scene, slot, x - (float)px, y - (float)py, uniform_below_one(k.z), uniform_float(k.w));
-#else
     set_camera_ray(scene, slot, x, y, uniform_float(k.z), uniform_float(k.w));
 #endif
     set_path_sample_weight(scene, slot, weight);

@@ -84,6 +84,20 @@ def test_under_half_a_sky_it_is_by_the_angle_of_the_normals(name, shape, expecte
     assert mean == pytest.approx(expected, abs=4 * error + 1e-6)
 
 
+def test_the_last_columns_of_a_wide_film_see_all_of_a_mesh():
+    """Of three triangles a small one is lit; a place in column 65535 has eight binary digits of the pixel's."""
+    small = np.sqrt(0.0008)
+    corners = np.array([(0, 0, 0), (small, 0, 0), (0, small, 0), (1, 0, 0), (0, 1, 0)])
+    faces = np.array([(0, 2, 1), (0, 1, 2), (0, 4, 3)])
+    plate = {"type": "mesh", "face_normals": True, "vertex_positions": corners, "faces": faces}
+    film = {"type": "hdrfilm", "width": 65536, "height": 1}
+    scene = scene_of(plate, METER | {"film": film}, sky=HALF_SKY, integrator={"type": "path"})
+    result = clvol.render(scene, spp=64, seed=3)
+    found = result.image[0, 40000:].mean() / np.pi
+    lit = 0.0008 / 1.0016
+    assert found == pytest.approx(lit, abs=4 * np.sqrt(lit / (64 * 25536)))
+
+
 def test_a_square_that_faces_a_square_has_its_form_factor():
     """Howell's catalogue, C-11: equal parallel squares at a distance of their side."""
     lamp = {"type": "rectangle", "to_world": clvol.translate([0, 0, 2]) @ clvol.rotate([1, 0, 0], 180)}
