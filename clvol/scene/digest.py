@@ -14,7 +14,7 @@ take seconds."""
 
 _APART = (
     *("source", "files", "name", "names", "spp", "seed", "choices", "sensors", "component_format", "kept"),
-    *("approximated", "left_out", "aovs"),  # the records tell
+    *("approximated", "left_out", "aovs", "made_from"),  # the records tell
     *("sanitize", "repairs"),  # the samples tell
     "meter",  # the sensor tells
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,7 @@ class ConstantEmitter:
 
     radiance: Spectrum = (1.0,)
     name: str = field(default="", compare=False, repr=False)
+    made_from: Any = field(default=None, compare=False, repr=False)  # `Daylight` of a sunsky
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +30,7 @@ class EnvmapEmitter:
     to_world: np.ndarray
     source: str = ""
     name: str = field(default="", compare=False, repr=False)
+    made_from: Any = field(default=None, compare=False, repr=False)  # `Daylight` of a sunsky
 
     def __repr__(self) -> str:
         return f"<EnvmapEmitter {self.source}: {self.radiance.shape[1]} x {self.radiance.shape[0]}>"
@@ -108,6 +110,7 @@ class SunEmitter:
     aperture: float
     up: tuple[float, float, float] | None = None
     name: str = field(default="", compare=False, repr=False)
+    made_from: Any = field(default=None, compare=False, repr=False)  # `Daylight` of a sunsky
 
     @property
     def solid_angle(self) -> float:

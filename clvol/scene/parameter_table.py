@@ -17,6 +17,8 @@ from clvol.scene import parameter_values as values
 from clvol.scene.medium_facts import channels_of
 from clvol.scene.phase import MOST_PEAKED
 from clvol.scene.sensor import field_of_view_x
+from clvol.scene.sky_model import TURBIDITIES
+from clvol.scene.sunsky import APERTURES, Daylight
 from clvol.volumes.grid import DenseGrid
 from clvol.volumes.transfer import Transfer
 
@@ -56,6 +58,8 @@ def parameters_of(scene: records.Scene) -> dict[str, Parameter]:
     seen: set[int] = set()
     for kind, parts in (("sensor", scene.sensors), ("shape", scene.shapes), ("emitter", scene.emitters)):
         for part in parts:
+            if id(getattr(part, "made_from", None)) in seen:  # the sun of a sky
+                continue
             prefix = part.name or kind
             taken[prefix] = taken.get(prefix, -1) + 1
             prefix += f"_{taken[prefix]}" if taken[prefix] else ""
@@ -318,6 +322,9 @@ def _bsdf(bsdf: Any, seen: set[int], most: float = 1.0) -> Found:
 
 
 def _emitter(emitter: records.Emitter, seen: set[int]) -> Found:
+    if getattr(emitter, "made_from", None) is not None:
+        yield from _daylight(emitter.made_from, seen)  # type: ignore[union-attr]
+        return
     match emitter:
         case records.ConstantEmitter():
             yield "radiance.value", _colour(emitter, "radiance", values.BRIGHTEST)
@@ -342,6 +349,26 @@ def _emitter(emitter: records.Emitter, seen: set[int]) -> Found:
             yield "to_world", _field(emitter, "to_world", values.matrix(values.unstretched), values.frozen)
         case records.ProjectorEmitter():
             yield from _projector(emitter, seen)
+
+
+def _daylight(day: Daylight, seen: set[int]) -> Found:
+    """A sunsky, of which the lights are made anew."""
+    seen.add(id(day))
+    air = day.air
+    yield "turbidity", _field(air, "turbidity", values.number(*TURBIDITIES))
+    for name in ("sky_scale", "sun_scale"):
+        yield name, _field(air, name, values.number(0.0))
+
+    def with_albedo(record: Any, value: records.Spectrum) -> Any:
+        return replace(record, albedo=np.broadcast_to(np.array(value), 3))
+
+    albedo = tuple(air.albedo.tolist())
+    grey = albedo[:1] if len(set(albedo)) == 1 else albedo
+    yield "albedo.value", Parameter(air, grey, values.colour(1.0), with_albedo, values.plain)
+    yield "sun_aperture", _field(air, "aperture", values.number(*APERTURES))
+    x, y, z = (day.turn @ day.sun).tolist()
+    yield "sun_direction", Parameter(day, (x, y, z), values.direction, lambda d, v: replace(d, towards=v))
+    yield "to_world", _field(air, "to_world", values.matrix(values.unstretched), values.frozen)
 
 
 def _projector(emitter: records.ProjectorEmitter, seen: set[int]) -> Found:

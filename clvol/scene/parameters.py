@@ -12,6 +12,7 @@ from clvol.errors import OptionError, shown
 from clvol.scene.parameter_table import Parameter, parameters_of, sensor_parameters
 from clvol.scene.parameter_values import check_together
 from clvol.scene.records import Medium, Scene, Sensor
+from clvol.scene.sunsky import remade
 from clvol.scene.vocabulary import did_you_mean, join_hints, listed
 
 _ALIASES = {"interior": "interior_medium", "exterior": "exterior_medium", "phase": "phase_function"}
@@ -165,6 +166,7 @@ class SceneParameters(MutableMapping[str, Any]):
             record = done[id(self._found[name].owner)]
             for one in (record, *(medium for medium in media if _holds(medium, record))):
                 check_together(one, name)
+        parts["emitters"] = remade(parts["emitters"], self.scene.emitters)
         self._put(parts)
         self._set.clear()
         self._read()

@@ -5,13 +5,15 @@ Locally z is up.  As in Mitsuba, nothing shines from below the horizon, nor whil
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import logging
+from dataclasses import dataclass, replace
 from datetime import date
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from clvol.base.rows import bands
+from clvol.errors import SceneError
 from clvol.scene.emitter import accept_common
 from clvol.scene.lights import ConstantEmitter, Emitter, EnvmapEmitter, SunEmitter
 from clvol.scene.reader import BRIGHTEST
@@ -35,6 +37,10 @@ FROM_MAP = np.array(
 )
 """From a map's axes, of which y is up, to those of the sky."""
 
+LOW_SUN = "the blue of a low sun, which sRGB has below 0, is 0"
+
+log = logging.getLogger("clvol")
+
 
 @dataclass(frozen=True, eq=False)
 class Air:
@@ -48,33 +54,93 @@ class Air:
     to_world: np.ndarray
 
 
+@dataclass(frozen=True, eq=False)
+class Daylight:
+    """What the lights of a `sunsky` are made from.
+
+    towards : unit vector to the sun in the world, where that is given.  local : that in the sky's own space,
+    where `towards` is None.  source : the plugin's name.
+    """
+
+    air: Air
+    towards: tuple[float, float, float] | None
+    local: np.ndarray
+    source: str
+
+    @property
+    def sun(self) -> np.ndarray:
+        """Unit vector to the sun in the sky's own space."""
+        if self.towards is None:
+            return self.local
+        return unit(np.linalg.inv(self.air.to_world[:3, :3]) @ np.array(self.towards))
+
+    @property
+    def turn(self) -> np.ndarray:
+        """From the sky's own space to the world, without its scale."""
+        matrix = self.air.to_world[:3, :3]
+        turned: np.ndarray = matrix / np.cbrt(np.abs(np.linalg.det(matrix)))
+        return turned
+
+
 def sunsky(reader: Reader) -> tuple[Emitter, ...]:
     """The `sunsky` plugin: the sky and the sun at a time and place, or with the sun in a direction."""
-    air = read_air(reader)
-    return lights(reader, air, _sun(reader, air))
+    return lights(reader, _daylight(reader, read_air(reader)))
 
 
-def lights(reader: Reader, air: Air, local: np.ndarray) -> tuple[Emitter, ...]:
-    """The sky and the sun, with the sun in a direction of local space."""
+def lights(reader: Reader, day: Daylight) -> tuple[Emitter, ...]:
+    """The sky and the sun."""
+    try:
+        made, said = lights_of(day)
+    except SceneError as error:
+        reader.fail(error.what, hint=error.hint)
+    for what in said:
+        reader.library.faults.approximate(what, reader.place(""))
+    return made
+
+
+def lights_of(day: Daylight) -> tuple[tuple[Emitter, ...], list[str]]:
+    """The sky and the sun, and what is taken as something else; SceneError where they are too bright."""
+    air, local, said = day.air, day.sun, list[str]()
     irradiance = np.zeros(3)
     if local[2] < 0:
-        reader.library.faults.approximate("a sky whose sun is below the horizon is black", reader.place(""))
+        said.append("a sky whose sun is below the horizon is black")
     elif air.sun_scale > 0:
-        irradiance = air.sun_scale * _visible(reader, sun_irradiance(air.turbidity, np.arcsin(local[2])))
-    sky: Emitter = ConstantEmitter((0.0,))
+        irradiance = air.sun_scale * sun_irradiance(air.turbidity, np.arcsin(local[2]))
+        said += [LOW_SUN] if (irradiance < 0).any() else []
+        irradiance = np.maximum(irradiance, 0.0)
+    sky: Emitter = ConstantEmitter((0.0,), made_from=day)
     if air.sky_scale > 0 and local[2] >= 0:
-        sky = EnvmapEmitter(checked(reader, _sky_map(air, local)), air.to_world @ FROM_MAP, reader.type)
+        radiance = checked(_sky_map(air, local), day.source)
+        sky = EnvmapEmitter(radiance, air.to_world @ FROM_MAP, day.source, made_from=day)
     if not irradiance.any():
-        return (sky,)
-    turn = air.to_world[:3, :3] / np.cbrt(np.abs(np.linalg.det(air.to_world[:3, :3])))
+        return (sky,), said
     half = np.radians(air.aperture / 2)
     sun = SunEmitter(
-        tuple(checked(reader, irradiance).tolist()),
-        tuple((turn @ local).tolist()),
+        tuple(checked(irradiance, day.source).tolist()),
+        tuple((day.turn @ local).tolist()),
         air.aperture,
-        tuple(turn[:, 2].tolist()) if np.arcsin(local[2]) < half else None,
+        tuple(day.turn[:, 2].tolist()) if np.arcsin(local[2]) < half else None,
+        made_from=day,
     )
-    return sky, sun
+    return (sky, sun), said
+
+
+def remade(emitters: tuple[Emitter, ...], before: tuple[Emitter, ...]) -> tuple[Emitter, ...]:
+    """Emitters with those made anew whose `Daylight` is none of those `before`; errors as `lights_of` has."""
+    known = {id(getattr(emitter, "made_from", None)) for emitter in before} | {id(None)}
+    made: list[Emitter] = []
+    done: set[int] = set()
+    for emitter in emitters:
+        day: Any = getattr(emitter, "made_from", None)
+        if id(day) in known:
+            made.append(emitter)
+        elif id(day) not in done:
+            done.add(id(day))
+            new, said = lights_of(day)
+            made += [replace(one, name=emitter.name) for one in new]
+            for what in said:
+                log.warning("%s", what)
+    return tuple(made)
 
 
 def read_air(reader: Reader) -> Air:
@@ -94,8 +160,8 @@ def read_air(reader: Reader) -> Air:
     return Air(turbidity, albedo, sky_scale, sun_scale, aperture, to_world)
 
 
-def _sun(reader: Reader, air: Air) -> np.ndarray:
-    """The unit vector to the sun in local space."""
+def _daylight(reader: Reader, air: Air) -> Daylight:
+    """With the sun at a time and place, or in a direction."""
     if not reader.has("sun_direction"):
         day = read_date(reader, "", 2010, 7, 10)
         hour, minute, second = (
@@ -104,14 +170,15 @@ def _sun(reader: Reader, air: Air) -> np.ndarray:
         hours = np.array(hour + (minute + second / 60) / 60)
         if abs(hours) > 1e6:
             reader.fail("the hour is too far from the day", "hour")
-        return sun_direction(day, hours, read_place(reader))
+        return Daylight(air, None, sun_direction(day, hours, read_place(reader)), reader.type)
     given = [name for name in (*TIME, *PLACE) if reader.has(name)]
     if given:
         reader.fail(f"give either sun_direction or {given[0]}, not both", given[0])
     direction = reader.vector("sun_direction", (0, 0, 1))
     if not direction.any():
         reader.fail("sun_direction is zero", "sun_direction")
-    return unit(np.linalg.inv(air.to_world[:3, :3]) @ unit(direction))
+    x, y, z = unit(direction).tolist()
+    return Daylight(air, (x, y, z), np.array((0.0, 0.0, 1.0)), reader.type)
 
 
 def unit(vector: np.ndarray) -> np.ndarray:
@@ -141,24 +208,10 @@ def read_date(reader: Reader, prefix: str, year: int, month: int, day: int) -> d
         reader.fail(f"there is no {year}-{month}-{day} ({error})", f"{prefix}day")
 
 
-def _visible(reader: Reader, irradiance: np.ndarray) -> np.ndarray:
-    """A colour without what a low sun lacks of blue."""
-    if (irradiance < 0).any():
-        say_blue(reader)
-    visible: np.ndarray = np.maximum(irradiance, 0.0)
-    return visible
-
-
-def say_blue(reader: Reader) -> None:
-    """Say that blue is cut."""
-    what = "the blue of a low sun, which sRGB has below 0, is 0"
-    reader.library.faults.approximate(what, reader.place(""))
-
-
-def checked(reader: Reader, light: np.ndarray) -> np.ndarray:
+def checked(light: np.ndarray, source: str) -> np.ndarray:
     """Light that is not too bright."""
     if light.max() > BRIGHTEST:
-        reader.fail(f"a {reader.type} must not exceed {BRIGHTEST:g}", "", "lower sky_scale or sun_scale")
+        raise SceneError(f"a {source} must not exceed {BRIGHTEST:g}", hint="lower sky_scale or sun_scale")
     return light
 
 

@@ -6,12 +6,14 @@ Light adds up, so that the mean of the pictures is that of the mean sky, which i
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from clvol.errors import SceneError
 from clvol.scene import sunsky
-from clvol.scene.lights import ConstantEmitter, Emitter, EnvmapEmitter
+from clvol.scene.lights import ConstantEmitter, Emitter, EnvmapEmitter, SunEmitter
 from clvol.scene.sky_model import Sky, sun_irradiance
 from clvol.scene.sun_position import Place, sun_direction
 from clvol.scene.sunsky import FROM_MAP, HEIGHT, WIDTH, Air, map_directions
@@ -61,17 +63,28 @@ def timed_sunsky(reader: Reader) -> tuple[Emitter, ...]:
             "a shutter_close of 1 shows all",
             reader.place(""),
         )
-        return sunsky.lights(reader, air, days.suns(np.array([opens]))[0])
+        day = sunsky.Daylight(air, None, days.suns(np.array([opens]))[0], "timed_sunsky")
+        return tuple(map(_apart, sunsky.lights(reader, day)))
     shares = opens + (closes - opens) * (np.arange(MOMENTS) + 0.5) / MOMENTS
     suns = days.suns(shares)
     radiance = mean_sky(air, suns) + mean_sun(air, suns)
     if (radiance < 0).any():
-        sunsky.say_blue(reader)
+        reader.library.faults.approximate(sunsky.LOW_SUN, reader.place(""))
     radiance = np.maximum(radiance, 0.0).astype(np.float32)
     if not radiance.any():
         return (ConstantEmitter((0.0,)),)
-    checked = sunsky.checked(reader, radiance)
+    try:
+        checked = sunsky.checked(radiance, "timed_sunsky")
+    except SceneError as error:
+        reader.fail(error.what, hint=error.hint)
     return (EnvmapEmitter(checked, air.to_world @ FROM_MAP, "timed_sunsky"),)
+
+
+def _apart(light: Emitter) -> Emitter:
+    """A light that does not say what it was made from, which would be a `sunsky`."""
+    if isinstance(light, ConstantEmitter | EnvmapEmitter | SunEmitter):
+        return replace(light, made_from=None)
+    return light
 
 
 def _days(reader: Reader) -> Days:
