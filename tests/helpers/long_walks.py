@@ -63,7 +63,10 @@ def scene_of(kind):
 
 
 def endless(kind):
-    """One voxel of 1e7; a majorant of 1e30; a medium that scatters 20,000 times across and never absorbs."""
+    """One voxel of 1e7; a density of 1, for a loose majorant; one that scatters for ever.
+
+    The last scatters 20,000 times across and never absorbs.
+    """
     values = np.ones((4, 4, 4), np.float32)
     scale, albedo = 1.0, 0.5
     if kind == "voxel":
