@@ -85,7 +85,7 @@ def test_under_half_a_sky_it_is_by_the_angle_of_the_normals(name, shape, expecte
 
 
 def test_the_last_columns_of_a_wide_film_see_all_of_a_mesh():
-    """Of three triangles a small one is lit; a place in column 65535 has eight binary digits of the pixel's."""
+    """Of three triangles a small one is lit; a place in column 65535 leaves eight digits to the pixel."""
     small = np.sqrt(0.0008)
     corners = np.array([(0, 0, 0), (small, 0, 0), (0, small, 0), (1, 0, 0), (0, 1, 0)])
     faces = np.array([(0, 2, 1), (0, 1, 2), (0, 4, 3)])
