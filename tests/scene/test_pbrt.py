@@ -104,6 +104,32 @@ def test_instances_stand_under_their_own_transform(load):
     assert [shape.to_world[:3, 3].tolist() for shape in scene.shapes] == [[2, 0, 0], [2, 2, 0]]
 
 
+@pytest.mark.parametrize(
+    "shape",
+    [
+        'Shape "trianglemesh" "point3 P" [0 0 0 1 0 0 0 1 0] "integer indices" [0 1 2]',
+        'Shape "bilinearmesh" "point3 P" [0 0 0 1 0 0 0 1 0 1 1 0]',
+        'Shape "loopsubdiv" "integer levels" 1 "point3 P" [0 0 0 1 0 0 0 1 0] "integer indices" [0 1 2]',
+        'Shape "plymesh" "string filename" "a.ply"',
+    ],
+    ids=lambda shape: shape.split('"')[1],
+)
+def test_meshes_have_any_number_of_instances(load, tmp_path, shape):
+    ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    ply += (
+        "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    )
+    (tmp_path / "a.ply").write_text(ply)
+    placed = 'ObjectInstance "a" Translate 0 1 0 ObjectInstance "a" Scale -1 1 1 ObjectInstance "a"'
+    scene = load(f'ObjectBegin "a" {shape} ObjectEnd {placed}')
+    first, second, mirrored = scene.shapes
+    assert first.mesh is second.mesh
+    assert (second.to_world - first.to_world)[:3, 3].tolist() == [0, 1, 0]
+    assert len(mirrored.mesh.faces) == len(first.mesh.faces)
+    with pytest.raises(clvol.SceneError, match="did you mean"):
+        load(f'ObjectBegin "a" {shape} "float alpa" 1 ObjectEnd {placed}')
+
+
 @pytest.mark.parametrize("reverse", [False, True])
 @pytest.mark.parametrize("mirror", [1, -1])
 def test_normals_keep_their_side_under_a_mirror(load, reverse, mirror):

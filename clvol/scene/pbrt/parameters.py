@@ -90,6 +90,11 @@ class Parameters:
             self._given.setdefault(parameter.name, parameter)
         self._asked: list[str] = []
 
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """The names of the parameters that somebody asked for."""
+        return tuple(dict.fromkeys(self._asked))
+
     def fail(self, what: str, where: str = "", hint: str = "") -> NoReturn:
         """Raise a SceneError about this statement."""
         raise SceneError(f"{self.what}: {what}", where or self.where, hint)
@@ -196,7 +201,7 @@ class Parameters:
         """Raise for the first parameter that nobody asked for."""
         for name, parameter in self._given.items():
             if name in self._own and name not in self._asked:
-                hint = join_hints(did_you_mean(name, self._asked), f"supported: {listed(self._asked)}")
+                hint = join_hints(did_you_mean(name, self._asked), f"supported: {listed(self.asked)}")
                 self.fail(f"unknown parameter '{shortened(name, 60)}'", parameter.where, hint)
 
     def _one(self, found: Parameter) -> float:

@@ -35,6 +35,7 @@ class Shapes:
     def __init__(self, context: Context) -> None:
         self.context = context
         self._raw: dict[int, RawMesh] = {}
+        self._asked: dict[int, tuple[str, ...]] = {}  # of the parameters of each statement
         self._built: dict[tuple[int, bytes], tuple[Mesh, np.ndarray]] = {}
         self._placed: dict[int, RawMesh] = {}
         self._textured = False
@@ -101,7 +102,7 @@ class Shapes:
 
     def triangles(self, thing: Thing, parameters: Parameters, matrix: np.ndarray) -> Node:
         """Triangles from the file itself."""
-        raw = self._once(thing, lambda: _indexed(parameters, 3))
+        raw = self._once(thing, parameters, lambda: _indexed(parameters, 3))
         if self._textured and raw.uvs is None:
             raw = self._placed.setdefault(id(raw), _with_places(raw))
         return self._mesh(thing, raw, matrix)
@@ -117,7 +118,7 @@ class Shapes:
                 self.context.say(what, thing.where)
             return raw
 
-        return self._mesh(thing, self._once(thing, read), matrix)
+        return self._mesh(thing, self._once(thing, parameters, read), matrix)
 
     def ply(self, thing: Thing, parameters: Parameters, matrix: np.ndarray) -> Node:
         """A .ply file, or one packed by gzip."""
@@ -133,7 +134,7 @@ class Shapes:
             except (ValueError, IndexError, OverflowError) as error:
                 parameters.fail(f"mesh '{path}': {error}", where)
 
-        return self._mesh(thing, self._once(thing, read), matrix)
+        return self._mesh(thing, self._once(thing, parameters, read), matrix)
 
     def loop(self, thing: Thing, parameters: Parameters, matrix: np.ndarray) -> Node:
         """A control mesh, subdivided by Loop's rules."""
@@ -153,16 +154,18 @@ class Shapes:
 
         what = "a subdivision surface is taken as the mesh that is subdivided, not its limit"
         self.context.say(what, thing.where)
-        return self._mesh(thing, self._once(thing, read), matrix)
+        return self._mesh(thing, self._once(thing, parameters, read), matrix)
 
-    def _once(self, thing: Thing, read: Callable[[], RawMesh]) -> RawMesh:
-        """What is read of a statement, once for all instances."""
+    def _once(self, thing: Thing, parameters: Parameters, read: Callable[[], RawMesh]) -> RawMesh:
+        """What is read of a statement, once for all instances, whose parameters are known then."""
         if id(thing) not in self._raw:
             try:
                 self._raw[id(thing)] = read()
             except ValueError as error:
-                thing.parameters().fail(str(error))
+                parameters.fail(str(error))
             self._things.append(thing)
+            self._asked[id(thing)] = parameters.asked
+        parameters.ignore(*self._asked[id(thing)])
         return self._raw[id(thing)]
 
     def _mesh(self, thing: Thing, raw: RawMesh, matrix: np.ndarray) -> Node:
