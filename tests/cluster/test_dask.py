@@ -170,6 +170,7 @@ def test_all_workers_may_be_killed_and_with_them_what_they_had_of_the_scene(expe
             kill_while_rendering(client, which, expected)
 
 
+@pytest.mark.contract
 def test_a_target_error_is_met_with_bits_that_a_device_has_too(client):
     options = {"target_error": 0.02, "seed": 5, "sampler": "independent", "pool": 256}
     seen = []

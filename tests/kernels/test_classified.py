@@ -130,6 +130,7 @@ def test_transmittance_is_that_of_the_classified_density(probes, transmittance, 
     assert_half_a_percent(1.0 - values[:, 0].astype(float), tau[-1], f"{transmittance}, {majorant}")
 
 
+@pytest.mark.contract
 def test_a_bias_of_half_a_percent_is_rejected(device):
     """A function that is 1.2 % too high, of which half a percent and a little is left in what collides."""
     medium = scene_with("window").shapes[0].interior

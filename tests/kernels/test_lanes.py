@@ -57,6 +57,7 @@ def test_transmittance_in_lanes_is_unbiased(probes, transmittance, majorant, loo
         assert field != "vacuum" or (values == 1.0).all()
 
 
+@pytest.mark.contract
 def test_half_a_percent_shows_in_lanes(device):
     """A scale that is off by as much, and the bound with it: the tests above would fail."""
     values, ray = FIELDS["ramp"](), RAYS["oblique"]

@@ -189,6 +189,7 @@ def test_a_majorant_scaled_up_shows_the_same_and_costs_more():
         clvol.merge([plain, render(scene(), samples=(512, 8), seed=3, majorant_scale=3.0, majorant="grid")])
 
 
+@pytest.mark.contract
 def test_largest_weights_merge_by_their_maximum_and_counts_by_their_mean():
     options = {"technique": "spectral", "aov": ("largest_weight", "tentative"), "seed": 4}
     described = scene((6.0, 3.0, 1.0))

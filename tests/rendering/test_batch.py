@@ -111,6 +111,7 @@ def test_samples_merge_and_a_render_goes_on(scene, tmp_path):
         clvol.merge([first, alone])
 
 
+@pytest.mark.contract
 def test_an_end_leaves_all_parts_the_same_samples(scene, ctrl_c):
     pressed = []
 

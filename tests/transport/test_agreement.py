@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from pictures import ball, box, gridded, hg, picture, unit, volume
 from stat_tests import assert_same_picture, image_mean
-from tiers import quick_first
 
 from clvol import render
 from clvol.accel.bounds import with_slack
@@ -116,7 +115,8 @@ def test_a_bias_of_one_tile_is_rejected():
         assert_same_picture(reference(), biased)
 
 
-@quick_first("majorant", ["global", "grid", "kdtree"])
+@pytest.mark.contract
+@pytest.mark.parametrize("majorant", ["global", "grid", "kdtree"])
 def test_a_majorant_ten_percent_too_low_is_caught_by_count_and_by_picture(majorant, monkeypatch):
     reference()  # before anything is broken
 
@@ -132,6 +132,7 @@ def test_a_majorant_ten_percent_too_low_is_caught_by_count_and_by_picture(majora
         assert_same_picture(reference(), broken)
 
 
+@pytest.mark.contract
 def test_the_image_mean_is_known_to_a_tenth_of_a_percent():
     mean, variance = image_mean(reference())
     assert (np.sqrt(variance) < 0.001 * mean).all()

@@ -119,6 +119,7 @@ def test_at_albedo_one_under_a_white_sky_weights_make_no_noise(technique):
     assert np.abs(result.image - 1).max() < 1e-4
 
 
+@pytest.mark.contract
 def test_the_background_lowers_the_noise_and_leaves_the_mean(monkeypatch):
     from stat_tests import assert_same_picture
 

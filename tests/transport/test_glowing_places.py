@@ -79,6 +79,7 @@ def test_legs_of_walks_through_both_lose_and_double_nothing(bounds):
     assert_matches(result, of_crossing(COLOURED), bias=0.03)
 
 
+@pytest.mark.contract
 def test_a_glow_that_goes_on_behind_the_first_collision_is_noticed(monkeypatch):
     original = programs.kernel_source
     ends = "walked.t, reach, limit, &segment"

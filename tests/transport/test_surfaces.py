@@ -85,7 +85,8 @@ def test_in_glass_no_light_can_be_sampled_and_every_path_weighs_one():
     assert np.abs(result.image - 1).max() < 1e-4
 
 
-@quick_first(
+@pytest.mark.contract
+@pytest.mark.parametrize(
     ("medium", "known", "uncertain"),
     [(None, 0.98109, 0.00009), (MILK, 0.94195, 0.00023)],
     ids=["clear", "milky"],

@@ -159,6 +159,7 @@ def test_half_a_percent_would_show_in_the_ramps_of_a_technique(case):
             assert_pooled([(result, factor * answer) for result, answer in pictures])
 
 
+@pytest.mark.contract
 def test_emission_scales_with_its_volume_and_not_with_what_scatters():
     """Emission is sigma_a L_e: half the albedo's rest, and L_e from a grid of three channels."""
     glow = volume(np.broadcast_to([1.0, 0.5, 0.25], (3, 3, 3, 3)).copy(), *CUBE)
