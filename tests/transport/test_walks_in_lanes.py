@@ -119,6 +119,7 @@ def test_walks_in_lanes_may_go_in_legs(kind, bounds):
         assert digest(rendered(cloud(), spp=64, seed=4, lanes="16", pool=2000)) == digest(one)
 
 
+@pytest.mark.contract
 def test_a_work_item_leaves_paths_to_the_next_wave(bounds):
     """Which changes no bit: nothing of them has begun."""
     whole = rendered(cloud(), spp=256, seed=5, lanes="8")
