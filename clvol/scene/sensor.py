@@ -178,14 +178,20 @@ def _shutter(reader: Reader) -> None:
 def batch(reader: Reader) -> Sensor:
     """The `batch` plugin: its sensors side by side on its film, each on as many columns.
 
+    A shape among them stands for the irradiancemeter in it.  One that is not in the scene is only measured.
+
     Their own films and samplers are superseded by those of the batch, but for fields of view: as in Mitsuba
     one that is not along x is what it comes to along x on the sensor's own film.
     """
     cameras, names = [], []
-    for key, node in reader.children("sensor"):
-        inside: Sensor | ShapeMeter = reader.build(node)
+    found = {**dict(reader.children("sensor")), **dict(reader.children("shape"))}
+    for key, node in ((key, found[key]) for key, _ in reader.node.parameters() if key in found):
+        inside = reader.build(node)
         if isinstance(inside, ShapeMeter):
-            reader.fail("a batch takes no irradiancemeter", key, IN_A_SHAPE)
+            hint = f"{IN_A_SHAPE}, and the shape into the batch"
+            reader.fail("an irradiancemeter of a batch stands in a shape", key, hint)
+        if not isinstance(inside, Sensor):
+            inside = _measured(reader, inside, key)
         camera = inside.camera
         if isinstance(camera, Batch):
             reader.fail("a batch takes no other batch", key, "put its sensors into this one")
@@ -200,6 +206,13 @@ def batch(reader: Reader) -> Sensor:
     if fault := batch_fault(made.film, len(cameras)):
         reader.fail(fault)
     return made
+
+
+def _measured(reader: Reader, record: object, key: str) -> Sensor:
+    """The sensor in a shape."""
+    if not isinstance(record, Shape) or record.meter is None:
+        reader.fail("a shape in a batch needs an irradiancemeter inside", key)
+    return record.meter.on(record)
 
 
 def batch_fault(film: Film, count: int) -> str:

@@ -10,7 +10,7 @@ from clvol.base.arguments import index
 from clvol.errors import OptionError, SceneError, shown
 from clvol.scene.loader import load_sensor
 from clvol.scene.parameters import sensor_with
-from clvol.scene.records import Batch, Meter, Sampler, Sensor
+from clvol.scene.records import Batch, IrradianceMeter, Meter, Sampler, Sensor
 from clvol.scene.sensor import BOX, batch_fault, film_fault
 
 View = int | Mapping[str, Any]
@@ -79,7 +79,7 @@ def _film_of_part(film: Film, batch: Batch, camera: Camera) -> Film:
     if fault := batch_fault(film, len(batch.parts)):
         raise SceneError(fault)
     part = replace(film, width=film.width // len(batch.parts))
-    return replace(part, rfilter=BOX) if isinstance(camera, Meter) else part
+    return replace(part, rfilter=BOX) if isinstance(camera, Meter | IrradianceMeter) else part
 
 
 def parts_of(scene: Scene) -> list[Scene]:

@@ -89,6 +89,27 @@ def test_each_part_has_the_bits_of_its_sensor_alone(scene, sampler):
     assert again.image.tobytes() == result.image.tobytes()
 
 
+def test_shapes_stand_for_the_irradiancemeters_in_them():
+    """A plate of the scene, which is seen as well, and one that is only measured."""
+    meter = {"type": "irradiancemeter", "film": {"type": "hdrfilm", "width": 2, "height": 1}}
+    up = clvol.translate((0, -1.2, 0)) @ clvol.rotate((1, 0, 0), -90)
+    plate = {"type": "rectangle", "to_world": up, "meter": meter}
+    lifted = plate | {"to_world": clvol.translate((0, 4, 0)) @ up}
+    batch = {"one": CAMERAS["one"], "below": {"type": "ref", "id": "plate"}, "above": lifted}
+    scene = load_dict(described(batch, plate=plate))
+    assert scene.sensor.names == ("one", "plate", "above") and len(scene.shapes) == 2
+    assert scene.sensor.parts[1].shape is scene.shapes[1]
+    result = clvol.render(scene, **OPTIONS)
+    singles = [
+        clvol.render(scene, sensor=2 + n, device=[0], **OPTIONS | {"seed": seed_of_part(5, n)})
+        for n in range(3)
+    ]
+    assert_parts_are(result, singles)
+    below, above = (clvol.render(scene, sensor=3 + n, spp=1024, seed=1).image.mean() for n in range(2))
+    assert above == pytest.approx(0.5 * np.pi)  # no ray meets the sun, as in Mitsuba
+    assert abs(below / above - 1) > 0.05
+
+
 def test_the_same_camera_twice_is_noisy_in_two_ways():
     twins = {"left": CAMERAS["one"], "right": CAMERAS["one"]}
     image = clvol.render(load_dict(described(twins, FILM | {"width": 12})), spp=256, seed=1).image

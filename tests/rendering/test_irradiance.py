@@ -158,7 +158,8 @@ def test_it_is_one_of_the_sensors_in_the_order_of_the_scene():
         ),
         ({"plate": {"type": "rectangle", "m": METER | {"near_clip": 1.0}}}, "near_clip"),
         ({"all": {"type": "merge", "plate": {"type": "cube", "m": METER}}}, "a shape in a merge takes no"),
-        ({"all": {"type": "batch", "m": METER}}, "a batch takes no irradiancemeter"),
+        ({"all": {"type": "batch", "m": METER}}, "of a batch stands in a shape; put it into the shape whose"),
+        ({"all": {"type": "batch", "m": {"type": "sphere"}}}, "needs an irradiancemeter inside"),
         (
             {"rod": {"type": "cylinder", "to_world": clvol.scale([1, 2, 1]), "m": METER}},
             "must not be stretched across",

@@ -168,6 +168,20 @@ def test_irradiance_is_the_same(folder, mitsuba, shape, angle):
     assert (stats.t.isf(FALSE_ALARM / 18, freedom) * error < BIAS * theirs.mean()).all()
 
 
+@pytest.mark.mitsuba
+def test_meters_in_a_batch_measure_the_same(folder, mitsuba):
+    """On the mean over each part of the film: in Mitsuba its pixels are places on the shape."""
+    theirs, result = both(folder, mitsuba, "gauges", {}, 512, 4096)
+    parts = [slice(8 * n, 8 * n + 8) for n in range(3)]
+    means = np.stack([theirs[:, :, part].mean(axis=(1, 2)) for part in parts], axis=1)
+    ours = np.stack([result.image[:, part].mean(axis=(0, 1), dtype=float) for part in parts])
+    variance = np.stack([result.variance[:, part].sum(axis=(0, 1), dtype=float) / 64**2 for part in parts])
+    t, freedom, error = welch(means, ours, variance, ROUNDING * means.mean())
+    assert not deviating(t, freedom, FALSE_ALARM)
+    assert (stats.t.isf(FALSE_ALARM / 18, freedom) * error < BIAS * means.mean(axis=0)).all()
+    assert abs(ours[1] / ours[2] - 1).max() > 0.05
+
+
 PBRT = """
 LookAt 1 1.5 -5  0 0 0  0 1 0
 Camera "perspective" "float fov" 40
