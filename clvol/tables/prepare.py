@@ -19,7 +19,8 @@ from clvol.tables.camera_medium import check_camera_medium
 from clvol.tables.majorants import Majorants, PreparedMajorant, choose_majorants
 from clvol.tables.resolution import check_resolution
 from clvol.tables.surfaces import Surfaces, prepare_surfaces, same_surface, with_looks
-from clvol.tables.volumes import PreparedVolume, check_cover, prepare_volume
+from clvol.tables.volumes import PreparedVolume, prepare_volume
+from clvol.tables.wrapped import Reach, reaches
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -137,11 +138,13 @@ class _Kept:
         centre, radius = scene_sphere(scene, found)
         shown = [v for n in found.surfaces for v in _shown_volumes(scene.shapes[n])]
         matter = number_matter([entry.medium for entry in found.entries], shown)
-        for medium in matter.media:
-            check_cover(medium)
+        wrapped = reaches(scene, found, shown)
         known = () if before is None else before.volumes
         in_place = before is not None and np.array_equal(before.centre, centre)
-        volumes = tuple(_prepared_volume(volume, centre, known, in_place) for volume in matter.volumes)
+        volumes = tuple(
+            _prepared_volume(volume, centre, known, in_place, wrapped.get(id(volume)))
+            for volume in matter.volumes
+        )
         check_resolution(scene, found, centre, radius, matter, volumes)
         surfaces = before.surfaces_of(scene, found) if before is not None and in_place else None
         surfaces = surfaces or prepare_surfaces(scene, found, centre)
@@ -179,16 +182,21 @@ def _others(scene: Scene) -> tuple[object, ...]:
 
 
 def _prepared_volume(
-    volume: GridVolume, centre: np.ndarray, known: tuple[PreparedVolume, ...], in_place: bool
+    volume: GridVolume,
+    centre: np.ndarray,
+    known: tuple[PreparedVolume, ...],
+    in_place: bool,
+    reach: Reach | None,
 ) -> PreparedVolume:
     """A volume's tables, or of its bricks what is `known`; `in_place`: the centre is the same."""
-    for one in known if in_place else ():
+    alike = [one for one in known if one.reach == reach]
+    for one in alike if in_place else ():
         if one.volume is volume:
             return one
-    for one in known:
+    for one in alike:
         if one.volume.grid is volume.grid and one.volume.wrap_mode == volume.wrap_mode:
-            return prepare_volume(volume, centre, one.bricks)
-    return prepare_volume(volume, centre)
+            return prepare_volume(volume, centre, one.bricks, reach)
+    return prepare_volume(volume, centre, reach=reach)
 
 
 def _same_objects(some: Sequence[object], others: Sequence[object]) -> bool:

@@ -8,25 +8,27 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.accel.bounds import classified
-from clvol.errors import SceneError
-from clvol.scene import records
-from clvol.scene.boundaries import is_clipped
-from clvol.scene.medium_facts import volume_roles
 from clvol.tables.affine import from_centred
 from clvol.volumes.bricks import BrickMap, BrickTree, build_bricks
 from clvol.volumes.grid import DenseGrid
 
 if TYPE_CHECKING:
+    from clvol.scene import records
+    from clvol.tables.wrapped import Reach
     from clvol.volumes.transfer import Transfer
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedVolume:
-    """A grid volume as bricks, with the map from the scene's centred world to brick index space."""
+    """A grid volume as bricks, with the map from the scene's centred world to brick index space.
+
+    `reach` : the samples that the bricks have, where it repeats or mirrors beyond its box in a medium.
+    """
 
     volume: records.GridVolume
     bricks: BrickMap | BrickTree
     world_to_index: np.ndarray
+    reach: Reach | None = None
 
     def peak(self, transfer: Transfer | None) -> np.ndarray:
         """The largest value of each channel, or of what is made of the values; float64 (channels,)."""
@@ -52,49 +54,28 @@ class PreparedVolume:
 
 
 def prepare_volume(
-    volume: records.GridVolume, centre: np.ndarray, bricks: BrickMap | BrickTree | None = None
+    volume: records.GridVolume,
+    centre: np.ndarray,
+    bricks: BrickMap | BrickTree | None = None,
+    reach: Reach | None = None,
 ) -> PreparedVolume:
-    """Build a volume's bricks, or take those of its grid; `centre`: the world position that is the origin."""
-    grid, shift = volume.grid, -first_sample(volume)
-    if shift.any() and bricks is None and isinstance(grid, DenseGrid):
-        wrapped = np.pad(grid.values, [(1, 1), (1, 1), (1, 1), (0, 0)], mode="wrap")
-        grid = replace(grid, values=wrapped)
+    """Build a volume's bricks, or take those of its grid; `centre`: the world position that is the origin.
+
+    `reach` : the samples that its medium can ask it for, of a volume that wraps beyond its box.
+    """
+    grid, first = volume.grid, -first_sample(volume) if reach is None else np.array(reach.first, float)
+    if bricks is None and isinstance(grid, DenseGrid):
+        if reach is not None:
+            grid = replace(grid, values=reach.of(grid.values, volume.wrap_mode))
+        elif first.any():
+            wrapped = np.pad(grid.values, [(1, 1), (1, 1), (1, 1), (0, 0)], mode="wrap")
+            grid = replace(grid, values=wrapped)
     bricks = bricks or build_bricks(grid)
     to_brick = np.eye(4)
-    to_brick[:3, 3] = -(np.array(bricks.origin) + shift)
-    return PreparedVolume(volume, bricks, to_brick @ from_centred(volume.index_to_world, centre))
+    to_brick[:3, 3] = -(np.array(bricks.origin) + first)
+    return PreparedVolume(volume, bricks, to_brick @ from_centred(volume.index_to_world, centre), reach)
 
 
 def first_sample(volume: records.GridVolume) -> np.ndarray:
     """Where a volume's bricks have its first sample, float64 (3,): dense ones that repeat begin before it."""
     return np.full(3, float(volume.wrap_mode == "repeat" and isinstance(volume.grid, DenseGrid)))
-
-
-def check_cover(medium: records.Medium) -> None:
-    """Refuse a volume that would need its wrap mode on the device: repeated or mirrored beyond its box.
-
-    Volumes of a medium are looked up wherever sigma_t is.
-
-    Raises
-    ------
-    SceneError
-        Such a volume's box is not that of sigma_t.
-    """
-    sigma_t = medium.sigma_t
-    for name, volume in volume_roles(medium).items():
-        if volume is sigma_t or volume.wrap_mode == "clamp":
-            continue
-        boxed = isinstance(sigma_t, records.GridVolume) and is_clipped(medium)
-        if not boxed or not np.allclose(_world_box(sigma_t), _world_box(volume)):
-            raise SceneError(
-                f"wrap_mode {volume.wrap_mode!r} of the {name} volume, whose box is not that of sigma_t",
-                volume.source or medium.name,
-                "give both volumes the same to_world, or use wrap_mode clamp",
-            )
-
-
-def _world_box(volume: records.Volume) -> np.ndarray:
-    """World positions of two opposite corners of a grid volume's box, float64 (4, 2)."""
-    assert isinstance(volume, records.GridVolume)
-    corners: np.ndarray = volume.index_to_world @ np.array([[*volume.lower, 1.0], [*volume.upper, 1.0]]).T
-    return corners

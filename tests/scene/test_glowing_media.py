@@ -8,11 +8,9 @@ from pictures import box, picture
 from test_scene_media import DENSITY, RGB, error_of, features_of, grid, medium_of
 
 import clvol
-from clvol.errors import SceneError
 from clvol.scene.describe import describe_scene
 from clvol.scene.medium_facts import medium_volumes
 from clvol.scene.records import GridVolume
-from clvol.tables.prepare import prepare
 
 COLOURED = np.stack([DENSITY, DENSITY / 2, DENSITY / 4], axis=-1)
 XML = """
@@ -104,12 +102,6 @@ CUBE = (-1, -1, -1), (1, 1, 1)
 def seen(medium):
     """Nearly parallel rays along z."""
     return picture([box(*CUBE, medium)], (), (0.1, 0.2, -90), (0.1, 0.2, 0), 1e-3)
-
-
-def test_its_wrap_mode_is_checked_as_that_of_other_volumes():
-    medium = medium_of(type="homogeneous", emission_density=grid(wrap_mode="repeat"))
-    with pytest.raises(SceneError, match="wrap_mode 'repeat' of the emission_density volume"):
-        prepare(seen(medium))
 
 
 def test_its_values_are_parameters():

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pictures import box, homogeneous
 from probe import grid_volume, medium_of, scene_of
 from trees import leaves_of
 
@@ -151,26 +150,6 @@ def test_volumes_of_emission_and_temperature_are_prepared_once_each():
     volumes = [prepared.volume for prepared in found.volumes]
     assert len(volumes) == 4 and len(found.majorants) == 1
     assert all(a is b for a, b in zip(volumes, (medium.sigma_t, albedo, emission, temperature), strict=True))
-
-
-@pytest.mark.parametrize("name", ["albedo", "emission", "temperature"])
-@pytest.mark.parametrize("mode", ["repeat", "mirror"])
-def test_a_wrapped_volume_must_share_the_box_of_sigma_t(name, mode):
-    values = np.ones((4, 4, 4))
-    wrapped = replace(grid_volume(values), wrap_mode=mode)
-    prepare(scene_of(replace(medium_of(values), **{name: wrapped})))
-    shifted = wrapped.index_to_world.copy()
-    shifted[0, 3] += 0.25
-    elsewhere = replace(wrapped, index_to_world=shifted)
-    with pytest.raises(SceneError, match=f"{mode}.*the {name} volume"):
-        prepare(scene_of(replace(medium_of(values), **{name: elsewhere})))
-    fog = homogeneous(1.0, 0.5)
-    with pytest.raises(SceneError, match=f"the {name} volume"):
-        prepare(
-            replace(
-                scene_of(medium_of(1.0)), shapes=(box((0, 0, 0), (1, 1, 1), replace(fog, **{name: wrapped})),)
-            )
-        )
 
 
 def test_bounds_beyond_a_float_are_refused_with_the_factor_that_did_it():

@@ -44,6 +44,7 @@ PICTURES = {
     "flakes of balls": ("flakes", {"depth": -1, "sky": 0.5, "first": "even", "second": "even"}, 96, 2048),
     "woven": ("woven", {}, 96, 4096),
     "solids": ("solids", {}, 64, 2048),
+    "wrapped": ("wrapped", {}, 64, 2048),
     "curves": ("curves", {}, 64, 1024),
     "attributes": ("attributes", {}, 64, 1024),
     "lamps": ("lamps", {}, 64, 2048),
