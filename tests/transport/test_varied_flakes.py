@@ -170,8 +170,9 @@ def test_in_a_mixture_they_leave_the_extinction_as_it_is(varied):
     assert_mean(clvol.render(once(phase), spp=1 << 14, seed=2), expected)
 
 
-@quick_first("technique", ["delta", "spectral", "decomposition"])
-@quick_first("phase", [VARIED, {"type": "blendphase", "weight": 0.4, "a": VARIED, "b": PLAIN}])
+@pytest.mark.contract
+@pytest.mark.parametrize("technique", ["delta", "spectral", "decomposition"])
+@pytest.mark.parametrize("phase", [VARIED, {"type": "blendphase", "weight": 0.4, "a": VARIED, "b": PLAIN}])
 def test_nothing_shows_in_a_furnace(technique, phase):
     """Albedo 1, two media that overlap, and a colour in one of them."""
     other = {"type": "homogeneous", "sigma_t": 0.5, "albedo": 1.0, "phase": FLAKES}
@@ -184,12 +185,14 @@ def test_nothing_shows_in_a_furnace(technique, phase):
     assert_mean(result, np.ones(3), 0.01)
 
 
+@pytest.mark.contract
 def test_emission_is_absorption_along_the_ray():
     eye, target, a, b = RAYS["aslant"]
     scene = scene_of(eye, target, fog=cube(medium(emission=1.0, phase=VARIED)))
     assert_mean(clvol.render(scene, spp=8192, seed=2), 1 - np.exp(-depth_between(a, b)))
 
 
+@pytest.mark.contract
 def test_a_grid_of_nearly_one_matrix_is_nearly_that_matrix():
     nearly = np.broadcast_to(ONE, (2, 2, 2, 6)).copy()
     nearly[0, 0, 0, 0] *= 1 + 1e-6
