@@ -21,7 +21,7 @@ from clvol.lab.hard.summary import Summary
 from clvol.lab.quiet import quiet_renders
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
     from pathlib import Path
 
     from clvol.lab.hard.case import Case
@@ -40,11 +40,13 @@ each picture to that number. `docs/hard-cases.jsonl` keeps the figures, and on w
 - **expected**: by closed form, or by float64 quadrature with code that shares nothing with the kernels
   (`clvol/lab/hard/block.py`, `clvol/lab/hard/scenes.py`).
 - **seen**: mean of all ways that are not too noisy, with its standard error.
+- **of one way**: the relative standard error of one of them (root mean square, of the noisiest channel),
+  which is what a verdict can see. A way that is off by seven of these is mostly called wrong. One that is
+  off by less may pass, and many of them show in the mean of all.
 - **right**: ways whose mean is within its error of what is expected. Relative errors below {rounding:g} are
   those of float32. All ways of a case together would raise a false alarm once in {alarm:,}.
-- **too noisy**: ways whose relative standard error is above {noisy:.0%} with the few samples taken here, so
-  that they show nothing: analog transmittance of what hardly passes, one path for channels that differ a
-  million times.
+- **too noisy**: ways whose relative standard error is above {noisy:.0%}, so that they show nothing and are
+  not decided: {undecided}.
 - **wrong**: all others, and any with a sample that is not finite, a walk that was given up or a density above
   a bound that the technique needs.
 - **Mitsuba {mitsuba}**: what its `volpath` (scalar_rgb) showed of the scene with as many samples, in at most
@@ -55,8 +57,10 @@ and `pytest`. `pytest tests/hard -m hard_full` renders them in every way.
 
 What is no mean of a picture has tests of its own:
 
-- a million samples in a pixel, the last samples of 2³² - 1 and one more, which is refused, paths of 1e4 and
-  1e5 scatterings: `tests/hard/test_many.py`
+- a million samples in a pixel, the last samples of 2³² - 1 and one more, which is refused, paths of 1e4
+  scatterings by every technique and of 1e5: `tests/hard/test_many.py`
+- the formulas themselves, by adding and doubling and by published tables; that the planes in which rays are
+  said to be are those of every technique's tree: `tests/hard/test_expected.py`
 - numbers of neighbours: `tests/hard/test_random.py`; reported variance: `tests/hard/test_statistics.py`
 - peaks that single precision does not tell, analog techniques and bounds that do not hold, which are refused:
   `tests/hard/test_cases.py`
@@ -101,6 +105,7 @@ def page(found: dict[str, Summary]) -> str:
             device=devices,
             rounding=ROUNDING,
             noisy=NOISY,
+            undecided=undecided(found.values()),
             alarm=round(1 / ALPHA),
             mitsuba=version,
             seconds=hard_mitsuba.SECONDS,
@@ -113,8 +118,8 @@ def page(found: dict[str, Summary]) -> str:
             continue
         lines += [f"\n## {group.capitalize()}\n"]
         lines += [
-            f"| case | expected | seen | right | too noisy | wrong | Mitsuba {version} |",
-            "|---|---|---|---|---|---|---|",
+            f"| case | expected | seen | of one way | right | too noisy | wrong | Mitsuba {version} |",
+            "|---|---|---|---|---|---|---|---|",
         ]
         lines += [f"{row(case, found[case.name])} {beside(theirs.get(case.name))} |" for case in have]
         sources = dict.fromkeys(case.source for case in have)
@@ -128,9 +133,24 @@ def row(case: Case, found: Summary) -> str:
     """A line of the table."""
     seen = ", ".join(said(m, e) for m, e in zip(found.mean, found.error, strict=True))
     expected = ", ".join(f"{value:.6g}" for value in found.expected)
-    return (
-        f"| {case.name} | {expected} | {seen} | {found.right} | {found.noisy or '–'} | {found.wrong or '–'} |"
-    )
+    verdicts = " | ".join((str(found.right), *(str(count or "–") for count in (found.noisy, found.wrong))))
+    return f"| {case.name} | {expected} | {seen} | {share(found.of_one)} | {verdicts} |"
+
+
+def share(value: float) -> str:
+    """A relative error as per cent."""
+    return f"{100 * value:.2g}%" if value >= 1e-5 else "–"
+
+
+def undecided(found: Iterable[Summary]) -> str:
+    """How many ways show nothing, of how many, and in which cases."""
+    summaries = list(found)
+    of_all = sum(summary.right + summary.noisy + summary.wrong for summary in summaries)
+    noisy = {summary.case: summary.noisy for summary in summaries if summary.noisy}
+    if not noisy:
+        return f"none of {of_all:,} ways of {len(summaries)} cases"
+    where = "; ".join(f"{count} of {case}" for case, count in noisy.items())
+    return f"{sum(noisy.values()):,} of {of_all:,} ways of {len(summaries)} cases ({where})"
 
 
 def beside(seen: dict[str, Any] | None) -> str:

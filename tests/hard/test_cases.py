@@ -56,6 +56,7 @@ def test_every_hard_case_shows_its_number(device, case):
 def test_every_hard_case_shows_its_number_in_every_way(device, case):
     for seen in run(device, [case], every_way, seed=2):
         assert_right(seen, 105 * len(CASES))
+        assert not seen.noisy
 
 
 def test_a_number_that_is_off_is_noticed(device):

@@ -50,6 +50,7 @@ class Case:
     spp : samples a pixel of each render.
     majorant_scale : multiplies the bounds.
     rounding : relative error of float32 in this case.
+    long : it takes up to a minute, and is no quick one.
     brightest : what one sample may show, where samples are so rare that none may have been drawn.
     note : what other renderers are known to do, or what limits this case.
     """
@@ -62,6 +63,7 @@ class Case:
     spp: int = 1024
     majorant_scale: float = 1.0
     rounding: float = ROUNDING
+    long: bool = False
     brightest: float = 1.0
     note: str = ""
 
@@ -127,11 +129,14 @@ def check(device: Device, case: Case, scene: Scene, choices: Choices, seed: int)
     """Render a case in one way, and hold it to what is expected."""
     trial = Trial.open(device, scene, choices)
     result = trial.render(seed, case.spp)
-    return judged(case, result, trial.names, trial.session.plan.needs_bound)
+    return judged(case, result, trial.names, trial.session.plan.needs_bound, scene.integrator.max_depth < 0)
 
 
-def judged(case: Case, result: Result, names: Names, needs_bound: bool) -> Seen:
-    """Hold a picture, whose pixels all have the same expectation on the mean, to a case."""
+def judged(case: Case, result: Result, names: Names, needs_bound: bool, whole: bool) -> Seen:
+    """Hold a picture, whose pixels all have the same expectation on the mean, to a case.
+
+    `whole`: no limit of depth is part of the scene, so that no energy may be lost to one.
+    """
     variance = result.variance.astype(float)
     mean = result.image.mean((0, 1), dtype=float)
     pixels = variance.shape[0] * variance.shape[1]
@@ -155,14 +160,18 @@ def judged(case: Case, result: Result, names: Names, needs_bound: bool) -> Seen:
         error,
         expected,
         min(1.0, p * len(mean)),
-        faults(result.stats, needs_bound and case.majorant_scale >= 1),
+        faults(result.stats, needs_bound and case.majorant_scale >= 1, whole),
         result.stats["largest_weight"],
     )
 
 
-def faults(stats: Mapping[str, Any], bounded: bool) -> tuple[str, ...]:
-    """What no sound render has: samples that are not finite, walks given up, look-ups above a bound."""
+def faults(stats: Mapping[str, Any], bounded: bool, whole: bool) -> tuple[str, ...]:
+    """What no sound render has: samples that are not finite, walks given up, look-ups above a bound.
+
+    And, of `whole` pictures, energy that is lost.
+    """
     names = ("non_finite", "walks_exhausted", *(("majorant_violations",) if bounded else ()))
+    names += ("energy_lost_to_caps",) if whole else ()
     return tuple(f"{stats[name]} {name.replace('_', ' ')}" for name in names if stats[name])
 
 

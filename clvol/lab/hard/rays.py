@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
-from clvol.lab.hard import scenes
+from clvol.lab.hard import scenes, splits
 from clvol.lab.hard.block import Block
 from clvol.lab.hard.case import Case
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 GROUP = "rays"
 SIDE = 17
@@ -42,22 +48,49 @@ RAYS = {
 """Origin, direction, field of view."""
 
 
-def _pair(name: str, o: tuple[float, ...], d: tuple[float, ...], fov: float) -> tuple[Case, ...]:
-    through = Case(
-        f"before a sky: {name}",
-        GROUP,
-        lambda: scenes.through([BLOCK], o, d, fov=fov),
-        lambda: scenes.transmitted([BLOCK], o, d),
-        "float64 quadrature of the optical depth",
-    )
-    lit = Case(
-        f"in the sun: {name}",
-        GROUP,
-        lambda: scenes.sunlit([BLOCK], o, d, fov=fov),
-        lambda: scenes.scattered([BLOCK], o, d),
-        "float64 quadrature of single scattering",
-    )
-    return through, lit
+Ray = tuple[Any, Any, float]
 
 
-CASES = tuple(case for name, ray in RAYS.items() for case in _pair(name, *ray))
+def _pair(name: str, block: Callable[[], Block], ray: Callable[[], Ray]) -> tuple[Case, ...]:
+    def through() -> dict[str, Any]:
+        o, d, fov = ray()
+        return scenes.through([block()], o, d, fov=fov)
+
+    def sunlit() -> dict[str, Any]:
+        o, d, fov = ray()
+        return scenes.sunlit([block()], o, d, fov=fov)
+
+    return (
+        Case(
+            f"before a sky: {name}",
+            GROUP,
+            through,
+            lambda: scenes.transmitted([block()], *ray()[:2]),
+            "float64 quadrature of the optical depth",
+        ),
+        Case(
+            f"in the sun: {name}",
+            GROUP,
+            sunlit,
+            lambda: scenes.scattered([block()], *ray()[:2]),
+            "float64 quadrature of single scattering",
+        ),
+    )
+
+
+def _split(name: str, side: int, ray: Callable[[Block], tuple[Any, Any]]) -> tuple[Case, ...]:
+    """Of a ray that is found in the tree, when it is asked for."""
+    block = cache(lambda: splits.lumps(side))
+    return _pair(name, block, cache(lambda: (*ray(block()), NARROW)))
+
+
+def _fixed(name: str, ray: Ray) -> tuple[Case, ...]:
+    return _pair(name, lambda: BLOCK, lambda: ray)
+
+
+CASES = (
+    *(case for name, ray in RAYS.items() for case in _fixed(name, ray)),
+    *_split("in the plane where the kd-tree splits first", 32, splits.in_split),
+    *_split("in such a plane, at 2/3, which no float is", 24, splits.in_split),
+    *_split("along the line where two splits of the kd-tree meet", 32, splits.in_two_splits),
+)

@@ -70,12 +70,13 @@ def sunlit(
     albedo: Any = 1.0,
     g: float = 0.0,
     sun: np.ndarray = SUN,
+    depth: int = 2,
     **more: Any,
 ) -> dict[str, Any]:
-    """The light of a sun that media scatter once; its irradiance times the phase function is 1."""
+    """The light of a sun that media scatter, once as a rule; its irradiance times the phase function is 1."""
     irradiance = 1 / _phase(g, -float(_ray(o, d)[1][0] @ sun))
     light = {"type": "directional", "direction": list(sun), "irradiance": irradiance}
-    scene = view(np.asarray(o, float), np.asarray(d, float), {"sun": light}, depth=2, **more)
+    scene = view(np.asarray(o, float), np.asarray(d, float), {"sun": light}, depth=depth, **more)
     phase = {"type": "hg", "g": g}
     return scene | {
         f"block{n}": block.shape(albedo=albedo, phase=dict(phase)) for n, block in enumerate(blocks)

@@ -7,7 +7,7 @@ import zlib
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING
 
-from clvol.lab.hard import boundaries, bounds, chromatic, phases, places, rays, sparse, thickness
+from clvol.lab.hard import boundaries, bounds, chromatic, phases, places, rays, sparse, thickness, white
 from clvol.lab.hard.case import CROSSED, SAMPLER, Case, Seen, check, loaded, ways
 from clvol.planning.choices import Choices
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 GROUPS = {
     module.GROUP: module.CASES
-    for module in (thickness, sparse, chromatic, phases, places, rays, boundaries, bounds)
+    for module in (thickness, white, sparse, chromatic, phases, places, rays, boundaries, bounds)
 }
 """Cases by group, in the order of the page."""
 CASES: tuple[Case, ...] = tuple(itertools.chain.from_iterable(GROUPS.values()))
@@ -50,7 +50,8 @@ def every_way(case: Case, scene: Scene) -> Iterable[Choices]:
 
 def quick_part() -> tuple[Case, ...]:
     """A few cases of each group."""
-    return tuple(case for cases in GROUPS.values() for case in cases[:: max(1, len(cases) // 3)])
+    short = ([case for case in cases if not case.long] for cases in GROUPS.values())
+    return tuple(case for cases in short for case in cases[:: max(1, len(cases) // 3)])
 
 
 def run(device: Device, cases: Iterable[Case], chosen: Chosen = in_turn, seed: int = 0) -> Iterator[Seen]:

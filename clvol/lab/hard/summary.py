@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -61,6 +62,16 @@ class Summary:
             ),
             device,
         )
+
+    @property
+    def of_one(self) -> float:
+        """Relative standard error of one way, root mean square, of the noisiest channel; 0 if it has none.
+
+        That is what a way shows by itself, and `error` what all show together.
+        """
+        ways = self.right + self.wrong or self.noisy
+        known = [e / m for e, m in zip(self.error, self.expected, strict=True) if m]
+        return max(known, default=0.0) * math.sqrt(ways)
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
