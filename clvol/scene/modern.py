@@ -8,7 +8,9 @@ from clvol.scene.sensor import OTHER_SAMPLERS, SAMPLERS_BEFORE
 
 
 def modernise(node: Node) -> None:
-    """Put what version 3 has in place of old integrators and samplers inside of a node."""
+    """Put what version 3 has in place of old integrators and samplers in a node; drop what is in vain."""
+    for name in node.unheeded:
+        node.pop(name, None)
     for name, value in list(node.parameters()):
         if isinstance(value, Node) and value.kind:
             node[name] = _modern(value)

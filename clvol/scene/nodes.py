@@ -37,7 +37,7 @@ class Node(dict[str, Any]):
     folders : list of Path
         Where relative file names are looked for, first match first.
 
-    `old`: whether it is of a scene of Mitsuba before version 2.
+    `old`: whether it is of a scene of Mitsuba before version 2; `unheeded`: what such a one gives in vain.
     A scene's `aliases` are further ids: name -> (the id it stands for, where).
     """
 
@@ -47,7 +47,7 @@ class Node(dict[str, Any]):
         self.folders = folders if folders is not None else [Path()]
         self.places: dict[str, str] = {}
         self.aliases: dict[str, tuple[str, str]] = {}
-        self.old = False
+        self.old, self.unheeded = False, set[str]()
         self._nameless = 0
 
     @property
@@ -86,7 +86,7 @@ class Node(dict[str, Any]):
         """The node as if these parameters were not given."""
         left = Node(self.where, self.kind, self.id, self.folders)
         left.update((key, value) for key, value in self.items() if key not in keys)
-        left.places, left.old = self.places, self.old
+        left.places, left.old, left.unheeded = self.places, self.old, self.unheeded
         return left
 
     def add_nameless(self, value: Node) -> None:

@@ -356,6 +356,7 @@ class Reader:
             return False
         what = f"'{name}' of {self.kind} '{self.type}' is not heeded: Mitsuba 0.6 has no such parameter"
         self.library.faults.approximate(what, self.place(name))
+        self.node.unheeded.add(name)
         return True
 
     def _left_over(self, name: str) -> SceneError:

@@ -1,5 +1,8 @@
 """Scenes of Mitsuba 0.3 to 1 mean what they meant: read as version 3 has it in other words."""
 
+import subprocess
+import sys
+
 import numpy as np
 import OpenImageIO as oiio  # noqa: N813
 import pytest
@@ -173,6 +176,24 @@ def test_what_mitsuba_06_had_and_plugins_are_no_unknown_parameters(scene, name):
     }
     with pytest.raises(clvol.SceneError, match=name):
         old(scene, user[scene.split('"')[1]])
+
+
+def test_a_scene_that_is_written_anew_has_no_parameter_that_was_not_heeded(tmp_path):
+    integrator = '<integrator type="volpath"><integer name="zzTop" value="6"/></integrator>'
+    lamp = '<emitter type="point"><rgb name="zzTop" value="1, 2, 3"/></emitter>'
+    (tmp_path / "old.xml").write_text(f'<scene version="0.5.0">{SENSOR}{integrator}{lamp}</scene>')
+    command = [
+        sys.executable,
+        "-m",
+        "clvol",
+        "scene",
+        str(tmp_path / "old.xml"),
+        "-o",
+        str(tmp_path / "new.xml"),
+    ]
+    subprocess.run(command, check=True, capture_output=True)
+    assert "zz" not in (tmp_path / "new.xml").read_text().split("-->")[-1]
+    assert same(clvol.load_file(tmp_path / "new.xml"), clvol.load_file(tmp_path / "old.xml"))
 
 
 def test_what_is_written_into_or_on_a_picture_is_left_out():

@@ -130,9 +130,7 @@ def test_what_cannot_be_is_told(monkeypatch):
     medium = {"type": "homogeneous", "albedo": {"type": "ref", "id": "v"}}
     both = {"type": "scene", "sensor": {"type": "perspective"}, "v": volume}
     both["ball"] = {"type": "sphere", "bsdf": shown, "interior": medium}
-    with pytest.raises(
-        SceneError, match="albedo volume, which is a surface's texture too; give it twice"
-    ):
+    with pytest.raises(SceneError, match="albedo volume, which is a surface's texture too; give it twice"):
         prepare(clvol.load_dict(both))
     monkeypatch.setattr(wrapped, "MAX_SAMPLES", 100)
     with pytest.raises(
