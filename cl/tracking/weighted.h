@@ -6,6 +6,7 @@
    probabilities, and whether or not sigma_maj bounds sigma_t.  With the rule `history` the mean weight of
    the channels stays as it is as long as sigma_maj bounds them all. */
 #include "tracking/collision.h"
+#include "tracking/event_weight.h"
 #include "tracking/flight.h"
 
 INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Tally *tally, Collision *collision)

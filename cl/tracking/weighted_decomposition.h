@@ -6,6 +6,7 @@
    split over real and null events of the residual in proportion to event_rate().  Weights are
    sigma_e / (sigma_maj P_e) with their sign, so that the control may exceed the density. */
 #include "tracking/collision.h"
+#include "tracking/event_weight.h"
 #include "tracking/flight.h"
 
 INLINE bool sample_collision(const MediumRay *in, uint first, Stream *stream, Tally *tally, Collision *collision)
