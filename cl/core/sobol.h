@@ -6,7 +6,8 @@
    A pixel's samples are dealt in turn to parts, whose scatter says how large the error is (clvol/picture/estimate.py).
    With "sobol" each part is scrambled on its own: a part's samples depend on each other, parts do not.  With "joint"
    the parts are pieces of one scrambled sequence: together they cover decisions as evenly as one part of as many
-   samples would. */
+   samples would.  But the choice among lights is each part's own: what a light brings hangs on the flight before, and
+   no order of a turn's points pairs all of its binary digits unlike those of the flight (see part_in_turn). */
 #ifndef CLVOL_CORE_SOBOL_H
 #define CLVOL_CORE_SOBOL_H
 #include "core/lane_random.h"
@@ -88,7 +89,9 @@ INLINE uint4 decision_block(const Scene *scene, SampleKey key, uint block, uint 
     uint4 point = sobol_point(scene, CLVOL_JOINT ? dealt : turn);
     if (block == BLOCK_LIGHT || block == BLOCK_SURFACE)
         point = point.zxyw; /* the best pair is for a light's point, or the direction */
-    const uint4 scramble = philox4x32((uint4)(key.pixel, randomization, number, segment), seed);
+    uint4 scramble = philox4x32((uint4)(key.pixel, randomization, number, segment), seed);
+    if (CLVOL_JOINT && block == BLOCK_LIGHT)
+        scramble.x = mixed_bits(scramble.x ^ part);
     return (uint4)(reverse_bits(owen_scramble(point.x, scramble.x)), reverse_bits(owen_scramble(point.y, scramble.y)),
                    reverse_bits(owen_scramble(point.z, scramble.z)), reverse_bits(owen_scramble(point.w, scramble.w)));
 }
@@ -124,6 +127,8 @@ INLINE BitsBlock lane_decisions(const Scene *scene, const LaneKeys *keys, Bits b
     point.z = turned ? as_drawn.y : as_drawn.z;
     BitsBlock scramble = {keys->pixel, randomization, number, segment};
     scramble = philox_lanes(scramble, seed);
+    if (CLVOL_JOINT)
+        scramble.x = either_bits(MASK(block == BLOCK_LIGHT), mixed_lanes(scramble.x ^ part), scramble.x);
     point.x = reverse_lanes(owen_scramble_lanes(point.x, scramble.x));
     point.y = reverse_lanes(owen_scramble_lanes(point.y, scramble.y));
     point.z = reverse_lanes(owen_scramble_lanes(point.z, scramble.z));
