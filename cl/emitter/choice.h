@@ -37,16 +37,14 @@ INLINE uint choose_by_table(const Scene *scene, float *pick)
 /* Of choices that go by the table.  A power of two keeps the fineness of small numbers. */
 #define TABLE_SHARE 0.25f
 
-/* How much a uniform sky needs sampling, which scattering finds as well. */
-#define UNIFORM_SKY_NEED 0.1f
-
-/* What a light is expected to bring to p.  A sky is found by scattering as well, and needs sampling less. */
+/* What a light is expected to bring to p.  A sky is found by scattering as well, and needs sampling less: not at all
+   where it is uniform. */
 INLINE float expected_light(const Scene *scene, uint light, float3 p)
 {
     __global const Emitter *emitter = scene->emitters + light;
     float expected = light_irradiance(emitter, p);
     if (is_environment(emitter))
-        expected *= CLVOL_HAS_CONSTANT ? UNIFORM_SKY_NEED : 0.5f;
+        expected *= 0.5f;
 #if CLVOL_LIGHT_CACHE
     float distance;
     const float3 d = light_middle(emitter, p, &distance);

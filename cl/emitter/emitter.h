@@ -12,13 +12,17 @@
 #include "emitter/sun.h"
 
 /* Radiance of the environment seen along `direction`, and the density with which next-event
-   estimation would have chosen that direction from `from`.  There is at most one environment, the first emitter. */
+   estimation would have chosen that direction from `from`.  There is at most one environment: the first emitter, or
+   behind all that are chosen among if it is uniform and not alone. */
 #if CLVOL_HAS_CONSTANT || CLVOL_HAS_ENVMAP
 INLINE float3 environment(const Scene *scene, float3 from, float3 direction, float *pdf)
 {
 #if CLVOL_HAS_ENVMAP
     *pdf = light_probability(scene, 0, from) * envmap_pdf(scene, direction);
     return envmap_radiance(scene, direction);
+#elif CLVOL_SKY_APART
+    *pdf = 0.0f;
+    return emitter_value(scene->emitters + scene->render->emitters);
 #else
     *pdf = light_probability(scene, 0, from) * INV_FOUR_PI;
     return emitter_value(scene->emitters);
@@ -80,7 +84,7 @@ INLINE LightSample sample_light(const Scene *scene, float3 from, float pick, flo
     light.direction = envmap_sample(scene, u, v, &light.pdf);
     light.pdf *= light.chosen;
     light.value = light.pdf > 0.0f ? envmap_radiance(scene, light.direction) / light.pdf : (float3)(0.0f);
-#elif CLVOL_HAS_CONSTANT
+#elif CLVOL_HAS_CONSTANT && !CLVOL_SKY_APART
     light.direction = sphere_direction(u, v);
     light.pdf = light.chosen * INV_FOUR_PI;
     light.value = emitter_value(emitter) / light.pdf;

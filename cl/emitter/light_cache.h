@@ -68,7 +68,7 @@ INLINE float cached_transmittance(const Scene *scene, uint light, float3 p, floa
             return 1.0f;
         p += from * d;
     }
-    if ((CLVOL_HAS_CONSTANT || CLVOL_HAS_ENVMAP) && is_environment(scene->emitters + light))
+    if ((CLVOL_HAS_ENVMAP || (CLVOL_HAS_CONSTANT && !CLVOL_SKY_APART)) && is_environment(scene->emitters + light))
         return cached_sky(scene, p, d);
     return cached_row(scene, (uint)row, p);
 }

@@ -62,6 +62,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_HAS_EMITTERS": int(f.emitters > 0),
         "CLVOL_HAS_NEAR_LIGHTS": int(f.near_lights),
         "CLVOL_HAS_CONSTANT": int(f.constant),
+        "CLVOL_SKY_APART": int(f.sky_apart),
         "CLVOL_HAS_ENVMAP": int(f.envmap),
         "CLVOL_HAS_DIRECTIONAL": int(f.directional),
         "CLVOL_HAS_POINT": int(f.point_lights),

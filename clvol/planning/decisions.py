@@ -118,7 +118,9 @@ class Decisions:
     @property
     def light_choice(self) -> bool:
         """There are lights to choose among, which is done by what they bring."""
-        return self.chosen["light_choice"] == "contribution" and self.nee and self.features.emitters > 1
+        return (
+            self.chosen["light_choice"] == "contribution" and self.nee and self.features.sampled_emitters > 1
+        )
 
     @property
     def uniform_share(self) -> float:
@@ -134,7 +136,7 @@ class Decisions:
     def mis(self) -> bool:
         """Both ways of finding a light are in use, so that they must be weighted."""
         f = self.features
-        return self.nee and (f.constant or f.envmap or f.area)
+        return self.nee and (f.samples_sky or f.area)
 
     @property
     def gathers_on_flights(self) -> bool:
@@ -185,6 +187,12 @@ class Decisions:
         return self.chosen["majorant"] != "none" and self.nee and residual
 
     @property
+    def may_walk_in_lanes(self) -> bool:
+        """Walks might be side by side, whatever the technique: so far as the scene goes."""
+        f = self.features
+        return self.chosen["lanes"] != "off" and f.heterogeneous and f.media == 1 and not f.transfers
+
+    @property
     def needs(self) -> MajorantNeeds:
         """What the cells of the majorant have to carry."""
         residual = self.chosen["transmittance"] == "residual-ratio"
@@ -193,6 +201,7 @@ class Decisions:
             self.tracker.control,
             cast("ResidualControl", self.chosen["control"]) if residual else "none",
             self.choices.majorant_scale,
+            self.may_walk_in_lanes,
         )
 
     @property

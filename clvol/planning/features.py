@@ -104,6 +104,24 @@ class Features:
         return self.area_meshes or self.area_spheres or self.area_disks or self.area_cylinders
 
     @property
+    def sky_apart(self) -> bool:
+        """A uniform sky among other lights, which next-event estimation leaves to scattering.
+
+        That finds it as well without a shadow ray, and the other lights get all of these.
+        """
+        return self.constant and self.emitters > 1
+
+    @property
+    def sampled_emitters(self) -> int:
+        """Lights that next-event estimation chooses among."""
+        return self.emitters - self.sky_apart
+
+    @property
+    def samples_sky(self) -> bool:
+        """The environment is one of them."""
+        return self.envmap or (self.constant and not self.sky_apart)
+
+    @property
     def sampled_lights(self) -> list[str]:
         """Kinds of light that are worth shadow rays, in words."""
         found = [words for name, words in SAMPLED_LIGHTS.items() if getattr(self, name)]

@@ -37,7 +37,7 @@ def used_names(plan: Decisions) -> Names:
         "control": chosen["control"] if plan.needs_residuals else "none",
         "sampler": chosen["sampler"],
         "shadow_cache": chosen["shadow_cache"] if plan.nee and walks else "none",
-        "light_choice": chosen["light_choice"] if plan.nee and features.emitters > 1 else "none",
+        "light_choice": chosen["light_choice"] if plan.nee and features.sampled_emitters > 1 else "none",
         "next_event": ("control" if plan.direction_control else "plain")
         if plan.nee and features.scattering
         else "none",

@@ -19,12 +19,14 @@ class MajorantNeeds:
     control : "none", "min" or "fitted", what the technique's decomposition subtracts.
     residual : "none", "mean", "min" or "max", the control of residual ratio tracking.
     scale : multiplies every bound, for experiments.
+    in_lanes : walks may go in lanes, in which cells cost more beside look-ups.
     """
 
     majorant: str = "auto"
     control: Control = "none"
     residual: Literal["none"] | ResidualControl = "none"
     scale: float = 1.0
+    in_lanes: bool = False
 
     @property
     def means(self) -> bool:

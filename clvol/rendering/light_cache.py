@@ -53,7 +53,7 @@ def light_cache_buffers(
     run("light_cache_extinction", [], [extinction])
     run("light_cache_transmittance", [extinction], [transmittance, irradiance])
     of_rows = transmittance.reshape(-1, cells)
-    if plan.features.constant or plan.features.envmap:
+    if plan.features.samples_sky:
         of_rows[0] = of_rows[-SKY_DIRECTIONS:].mean(axis=0)
     record["typical"] = typical_radiance(extinction, (of_rows * irradiance.reshape(-1, cells)).sum(axis=0))
     return {

@@ -269,7 +269,7 @@ def render_record(prepared: PreparedScene, seed: int) -> np.ndarray:
     record["seed"] = seed_words(seed)
     record["max_depth"] = scene.integrator.max_depth & 0xFFFFFFFF
     record["rr_depth"] = scene.integrator.rr_depth
-    record["emitters"] = prepared.plan.features.emitters
+    record["emitters"] = prepared.plan.features.sampled_emitters
     record["media"] = prepared.plan.features.media
     if prepared.surfaces is not None:
         record["triangles"] = len(prepared.surfaces.faces)

@@ -38,9 +38,8 @@ def light_cache_record(prepared: PreparedScene) -> np.ndarray:
 def rows(prepared: PreparedScene) -> int:
     """Numbers that a cell has: one of each light that has any, and six of a sky."""
     features = prepared.plan.features
-    return min(features.emitters, layout.MOST_WEIGHED_LIGHTS) + SKY_DIRECTIONS * (
-        features.constant or features.envmap
-    )
+    lights = min(features.sampled_emitters, layout.MOST_WEIGHED_LIGHTS)
+    return lights + SKY_DIRECTIONS * features.samples_sky
 
 
 def heterogeneous_bounds(prepared: PreparedScene) -> tuple[np.ndarray, np.ndarray]:

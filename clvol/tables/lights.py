@@ -63,7 +63,8 @@ def light_table(
     surfaces : None where a scene has none.
 
     The environment comes first, or else the strongest light; the others follow, weakest first, in the order
-    of their intervals of the random number that chooses (`selection`), but for a sun, which comes last.
+    of their intervals of the random number that chooses (`selection`), but for a sun, which comes last. A
+    uniform sky among other lights is never chosen (`Features.sky_apart`): it comes after all of them.
     """
     emitters = emitter_order(scene)
     shapes = () if surfaces is None else surfaces.shapes
@@ -94,17 +95,26 @@ def light_table(
             power[i] = _describe_area(table[i], shapes[number], emission, number, centre)
             if emission in pictures:
                 table[i]["beam_width"] = 1 + pictures.index(emission)
-    late = np.where(table["kind"] == layout.enum("EMITTER", "sun"), np.inf, power)
-    order = np.argsort(late, kind="stable")
-    if len(order):
-        first = 0 if emitters and _is_environment(emitters[0]) else order[-1]
-        order = np.concatenate([[first], order[order != first]])
-    table = table[order]
-    table["select_pdf"], table["cdf"] = selection(power[order], uniform)
+    order, chosen = _order(table["kind"], power)
+    table, power = table[order], power[order]
+    among = table[:chosen]
+    among["select_pdf"], among["cdf"] = selection(power[:chosen], uniform)
     of_shape = np.full(len(shapes), -1, np.int32)
     lit = np.flatnonzero(table["kind"] == layout.enum("EMITTER", "area"))
     of_shape[table["shape"][lit]] = lit
     return LightTable(table, np.concatenate(faces), np.concatenate(cdf), of_shape, pictures)
+
+
+def _order(kind: np.ndarray, power: np.ndarray) -> tuple[np.ndarray, int]:
+    """Numbers of the lights in the order of the table, and how many of them are chosen among."""
+    constant, envmap, sun = (layout.enum("EMITTER", name) for name in ("constant", "envmap", "sun"))
+    order = np.argsort(np.where(kind == sun, np.inf, power), kind="stable")
+    skies = np.isin(kind[order], (constant, envmap))
+    sky, others = order[skies], order[~skies]
+    if len(sky) and len(others) and kind[sky[0]] == constant:
+        return np.concatenate([others[-1:], others[:-1], sky]), len(others)
+    first = sky if len(sky) else others[-1:]
+    return np.concatenate([first, others if len(sky) else others[:-1]]), len(order)
 
 
 def selection(power: np.ndarray, uniform: float = 0.0) -> tuple[np.ndarray, np.ndarray]:

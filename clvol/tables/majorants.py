@@ -196,7 +196,7 @@ def _candidate(one: _Walked, bounds: AnyBounds, kind: str, needs: MajorantNeeds)
         tree = build_tree(bounds, extent * bounds.cell_size, rate, *visits, *technique)
         return _Candidate(bounds, tree, tree.cost)
     if kind == "grid":
-        bounds, cost = costs.best_grid(bounds, extent * bounds.cell_size, rate, *technique)
+        bounds, cost = costs.best_grid(bounds, extent * bounds.cell_size, rate, *technique, needs.in_lanes)
         return _Candidate(bounds, None, cost)
     return _Candidate(bounds, None, costs.global_cost(bounds, extent * bounds.cell_size, rate, *technique))
 

@@ -137,7 +137,7 @@ START = np.array([0.1, 0.65, 0.02])
 
 def test_rays_along_planes_and_corners_of_cells_get_on(device, monkeypatch):
     """A cell walk that finds its cell from a position could stand still where a ray grazes a plane."""
-    monkeypatch.setattr(costs, "CELL_COST", 0.0)
+    monkeypatch.setattr(costs, "LANE_CELL_COST", 0.0)
     values = np.random.default_rng(5).uniform(0, 1e-3, (64, 64, 64)).astype(np.float32)
     probe = Probe(device, scene_of(medium_of(values)), lanes="8")
     cells = probe.prepared.majorants[0].cells

@@ -148,7 +148,9 @@ class World:
         self.table = lights.light_table(scene, self.centre, radius, self)
         records = self.shape_records()
         render = np.zeros(1, layout.RENDER)
-        render["emitters"], render["triangles"] = len(self.table.emitters), len(self.faces)
+        kinds = self.table.emitters["kind"]
+        sky_apart = len(kinds) > 1 and kinds[-1] == layout.enum("EMITTER", "constant")
+        render["emitters"], render["triangles"] = len(kinds) - sky_apart, len(self.faces)
         quadrics = np.zeros(len(shapes), layout.QUADRIC)
         quadrics["shape"] = np.arange(len(shapes))
         self.buffers = [
@@ -245,7 +247,7 @@ LIGHTS = {
     "smooth mesh": shape("mesh", PLACE, mesh=patches(True)),
     "flipped smooth mesh": shape("mesh", PLACE, flip=True, mesh=patches(True)),
 }
-FILL = ConstantEmitter((0.05,))  # a second light, so that every density carries a choice
+FILL = DirectionalEmitter((0.05,), (0.0, 0.0, -1.0))  # a second light, so that every density carries a choice
 FROM = {  # in the light's own space
     "before": (0.2, 0.1, 3.0),
     "behind": (0.1, -0.3, -2.0),
@@ -262,7 +264,7 @@ def world_point(light, name):
 
 @pytest.fixture(scope="module", params=LIGHTS, ids=lambda name: name.replace(" ", "-"))
 def lit(request, device):
-    """A light of unit radiance in the dark but for a weak sky, and its world."""
+    """A light of unit radiance in the dark but for a weak light far away, and its world."""
     return LIGHTS[request.param], World(device, [LIGHTS[request.param]], [FILL], centre=(0.2, 0.1, 0.0))
 
 
@@ -347,6 +349,8 @@ def test_points_of_lights_are_drawn_by_their_density(lit, place):
     towards = point - world.centre - seen.p
     facing = (seen.n * towards).sum(1) / np.linalg.norm(towards, axis=1)
     clear = np.abs(facing) > 1e-3
+    if light.kind == "mesh":  # points as near an edge as single precision puts them may be the neighbour's
+        clear &= np.minimum(np.minimum(u, v), 1 - u - v) > 1e-7 * samples.distance
     front = facing > 0
     assert (front == (seen.radiance[:, 0] > 0))[clear].all()
     assert (front == (samples.value[:, 0] > 0))[clear].all()
@@ -492,7 +496,7 @@ def test_lights_send_what_closed_forms_say(device, name):
 
 
 def test_a_scene_of_many_lights_sums_them(device):
-    """One of each kind in three colours: the choice among them is made up for."""
+    """One of each kind in three colours: the choice among them is made up for, and a uniform sky left out."""
     colours = np.random.default_rng(1).uniform(0.1, 2.0, (4, 3))
     names = ("sphere", "rectangle", "ellipse", "cylinder")
     shapes, expected = [], np.zeros(3)
@@ -510,7 +514,6 @@ def test_a_scene_of_many_lights_sums_them(device):
     expected += np.array([0.3, 1.0, 2.0]) * 2 / 5**1.5
     expected += np.array([0.5, 0.2, 0.1]) * 0.8
     expected += np.array([9.0, 4.0, 1.0]) / 9 * (20 - 12) / (20 - 8)
-    expected += np.pi * np.array([0.1, 0.2, 0.3])
     centre = np.array([1e6, -2e6, 3e6])  # what the device sees does not depend on where the scene is
     moved = [
         Shape(
@@ -525,7 +528,7 @@ def test_a_scene_of_many_lights_sums_them(device):
     emitters[0] = PointEmitter(emitters[0].intensity, tuple(centre + emitters[0].position))
     emitters[2] = SpotEmitter(emitters[2].intensity, translate(centre) @ spot_to_world, 20.0, 8.0)
     world = World(device, moved, emitters, centre, radius=1.0)
-    assert world.table.emitters["kind"][0] == layout.enum("EMITTER", "constant")
+    assert world.table.emitters["kind"][-1] == layout.enum("EMITTER", "constant")
     mean, variance = estimate(world, 1 << 23)
     assert (np.sqrt(variance) < 0.001 * expected).all()
     assert (np.abs(z_score(mean, variance, expected)) < largest_z(3)).all(), (mean, expected)
@@ -604,7 +607,7 @@ def choices(world, numbers):
 
 
 def test_lights_are_chosen_by_their_power_and_never_without(device):
-    """Powers from 1e-9 of the whole to most of it, and none; also of an environment."""
+    """Powers from 1e-9 of the whole to most of it, and none; a uniform sky beside them never is."""
     dark = shape("sphere", np.eye(4), (0.0,))
     powers = np.array([1e-9, 3.0, 0.0, 1e-3, 0.4, 7.0, 0.0, 2e-6])
     points = [PointEmitter((p,), (i, 0.0, 0.0)) for i, p in enumerate(powers)]
@@ -629,7 +632,9 @@ def test_lights_are_chosen_by_their_power_and_never_without(device):
         # the rarest: as many of the 2³² random numbers as its probability says
         rare = float(table["select_pdf"][table["value"][:, 0] == np.float32(1e-9)][0])
         assert rare > 0 and rare * 2**32 == round(rare * 2**32)
-        assert (table["kind"][0] == layout.enum("EMITTER", "constant")) == bool(sky)
+        of_skies = table["kind"] == layout.enum("EMITTER", "constant")
+        assert of_skies.tolist() == [False] * (len(table) - len(sky)) + [True] * len(sky)
+        assert not table["select_pdf"][of_skies].any()
 
 
 def test_lights_without_any_power_are_equally_likely(device):
