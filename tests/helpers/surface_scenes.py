@@ -24,6 +24,7 @@ from clvol.scene.primitives import mesh_of
 from clvol.scene.records import (
     ConstantEmitter,
     DirectionalEmitter,
+    EnvmapEmitter,
     Mesh,
     PointEmitter,
     Shape,
@@ -123,8 +124,17 @@ def view(shapes, lights, eye=(0.13, 0.21, -4.0), target=(0.05, 0.02, 0.0), fov=3
 
 
 def sampled(shapes, lights=(SKY,), **more):
-    """A scene for next-event estimation; `lights` of any kind, the sky among them."""
-    return view([*shapes, *SAMPLED], (*lights, *UNLIT), **more)
+    """A scene for next-event estimation; `lights` of any kind, the sky among them.
+
+    That is a map: a uniform sky beside other lights would not be sampled.
+    """
+    return view([*shapes, *SAMPLED], (*map(_mapped, lights), *UNLIT), **more)
+
+
+def _mapped(light):
+    if not isinstance(light, ConstantEmitter):
+        return light
+    return EnvmapEmitter(np.tile(np.float32(light.radiance), (2, 4, 3 // len(light.radiance))), np.eye(4))
 
 
 def found(shapes, lights=(SKY,), **more):

@@ -71,7 +71,7 @@ def signed_z(device):
 
 def test_a_dropped_weight_sign_is_caught(device, mutate):
     assert signed_z(device) < largest_z(BINS + 1)
-    mutate("tracking/weighted.h", "beta *= (sigma_n", "beta *= (abs_of(sigma_n)")
+    mutate("tracking/weighted.h", "event_weight(sigma_n,", "event_weight(abs_of(sigma_n),")
     assert signed_z(device) > largest_z(BINS + 1)
 
 
