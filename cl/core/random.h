@@ -130,4 +130,12 @@ INLINE bool choose_event(uint k, float part, float rest)
     return (part <= rest) ? happened : !happened;
 }
 
+/* Wellons' lowbias32. */
+INLINE uint mixed_bits(uint x)
+{
+    x = (x ^ (x >> 16)) * 0x7FEB352Du;
+    x = (x ^ (x >> 15)) * 0x846CA68Bu;
+    return x ^ (x >> 16);
+}
+
 #endif

@@ -55,14 +55,6 @@ DEFINE_SCRAMBLE(reverse_bits, owen_scramble, part_in_turn, uint)
 DEFINE_SCRAMBLE(reverse_lanes, owen_scramble_lanes, lane_part_in_turn, Bits)
 #endif
 
-/* Wellons' lowbias32. */
-INLINE uint mixed_bits(uint x)
-{
-    x = (x ^ (x >> 16)) * 0x7FEB352Du;
-    x = (x ^ (x >> 15)) * 0x846CA68Bu;
-    return x ^ (x >> 16);
-}
-
 /* Number `index` of the sequence, bits reversed. */
 INLINE uint4 sobol_point(const Scene *scene, uint index)
 {

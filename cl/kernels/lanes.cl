@@ -17,6 +17,9 @@
 typedef struct {
     Real o_x, o_y, o_z, d_x, d_y, d_z, inverse_x, inverse_y, inverse_z, t_max, per_depth;
     Int channel;
+#if LANE_FLIES_ON && CLVOL_SUN_CONTROL
+    Real cell_x, cell_y, cell_z, cells_x, cells_y, cells_z; /* the ray in cells of the cache of lights */
+#endif
 } LaneRays;
 
 INLINE void set_lane_axis(Real *o, Real *d, Real *inverse, uint lane, float origin, float direction)
@@ -31,7 +34,7 @@ INLINE void set_lane_axis(Real *o, Real *d, Real *inverse, uint lane, float orig
 INLINE void lane_put(LaneRays *rays, LaneState *state, uint lane, const LaneWalk *walk)
 {
     const Ray ray = walk->in.index_ray;
-    const float per_depth = 1.0f / walk->in.scale; /* infinite for vacuum */
+    const float per_depth = 1.0f / (LANE_FLIES_ON ? walk->in.rate : walk->in.scale); /* infinite for vacuum */
     set_lane_axis(&rays->o_x, &rays->d_x, &rays->inverse_x, lane, ray.o.x, ray.d.x);
     set_lane_axis(&rays->o_y, &rays->d_y, &rays->inverse_y, lane, ray.o.y, ray.d.y);
     set_lane_axis(&rays->o_z, &rays->d_z, &rays->inverse_z, lane, ray.o.z, ray.d.z);
@@ -50,6 +53,22 @@ INLINE void lane_put(LaneRays *rays, LaneState *state, uint lane, const LaneWalk
     set_lane_int(state->violations, lane, 0);
     set_lane_int(state->happened, lane, 0);
     set_lane_int(state->alive, lane, -1);
+#if LANE_FLIES_ON
+    set_lane(state->share, lane, walk->in.scale * per_depth);
+    set_lane(state->here, lane, 0.0f);
+    set_lane(state->caught, lane, 0.0f);
+    set_lane(state->lit, lane, 0.0f);
+    set_lane(state->met_lit, lane, 0.0f);
+#if CLVOL_SUN_CONTROL
+    const Ray cells = sunlit_ray(walk->in.scene, walk->in.world_ray);
+    set_lane(rays->cell_x, lane, cells.o.x);
+    set_lane(rays->cell_y, lane, cells.o.y);
+    set_lane(rays->cell_z, lane, cells.o.z);
+    set_lane(rays->cells_x, lane, cells.d.x);
+    set_lane(rays->cells_y, lane, cells.d.y);
+    set_lane(rays->cells_z, lane, cells.d.z);
+#endif
+#endif
 }
 
 INLINE LaneArrival lane_arrival(const LaneRays *rays, const LaneState *state, uint lane)
@@ -57,7 +76,7 @@ INLINE LaneArrival lane_arrival(const LaneRays *rays, const LaneState *state, ui
     LaneArrival arrival;
     const uint lookups = (uint)lane_int(state->lookups, lane);
     arrival.happened = lane_int(state->happened, lane) != 0;
-    arrival.t = LANE_FLIES_ON && arrival.happened ? lane_of(state->met, lane) : lane_of(state->t, lane);
+    arrival.t = lane_of(state->t, lane);
     arrival.estimate = lane_of(state->estimate, lane);
     Tally tally = {lookups,
                    lookups,
@@ -68,8 +87,18 @@ INLINE LaneArrival lane_arrival(const LaneRays *rays, const LaneState *state, ui
                    0.0f,
                    0,
                    0.0f};
+#if LANE_FLIES_ON
+    const Expected expected = {arrival.estimate, lane_of(state->caught, lane), lane_of(state->lit, lane),
+                               lane_of(state->met_lit, lane)};
+    arrival.expected = expected;
+    if (arrival.estimate != 0.0f && arrival.t < lane_of(rays->t_max, lane))
+        stop_walk(arrival.t, &tally);
+    if (arrival.happened)
+        arrival.t = lane_of(state->met, lane);
+#else
     if (!arrival.happened && arrival.t < lane_of(rays->t_max, lane))
         stop_walk(arrival.t, &tally);
+#endif
     arrival.tally = tally;
     return arrival;
 }
@@ -156,8 +185,10 @@ INLINE LanesWalked walk_lanes(const Scene *scene, uint group, __global const uin
     const Real zero = (Real)(0.0f);
     const Int none = (Int)(0);
     LaneRays rays = {zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, none};
-    LaneState state = {zero, zero, zero, zero, zero, zero, {int_bits(none), int_bits(none)},
-                       none, none, none, none, none};
+    LaneState state = {zero, zero, zero, zero, zero};
+#if LANE_FLIES_ON && CLVOL_SUN_CONTROL
+    const Sunlit sunlit = sunlit_begin(scene);
+#endif
     LanePath paths[CLVOL_LANES];
     for (uint lane = 0; lane < CLVOL_LANES; ++lane)
         paths[lane].slot = NO_SLOT;
@@ -191,6 +222,9 @@ INLINE LanesWalked walk_lanes(const Scene *scene, uint group, __global const uin
                     paths[lane].slot = slot;
                     paths[lane].from = walk.from;
                     paths[lane].start = walk.in.world_ray.o;
+#if CLVOL_EXPECTS_BACKGROUND
+                    paths[lane].k = walk.k;
+#endif
 #if CLVOL_HAS_GLOW
                     paths[lane].length = min_of(walk.in.t_max, 1e30f);
 #endif
@@ -229,6 +263,10 @@ INLINE LanesWalked walk_lanes(const Scene *scene, uint group, __global const uin
         const Real found = lane_density(&volume, x, y, z, rays.channel, ready, &state.stream);
         state.violations -= ready & MASK(found > state.bound);
         const BitsPair k = lane_pair(&state.stream, ready);
+#if LANE_FLIES_ON && CLVOL_SUN_CONTROL
+        state.here = lane_sunlit(&sunlit, rays.cell_x + state.t * rays.cells_x, rays.cell_y + state.t * rays.cells_y,
+                                 rays.cell_z + state.t * rays.cells_z);
+#endif
         const Int ended = lane_event(&state, found, k.x, ready);
         state.depth = either(ready, lane_exponential(k.y) * rays.per_depth, state.depth);
         state.happened |= LANE_FLIES_ON ? none : ended;

@@ -7,6 +7,7 @@
 #endif
 #include "core/random.h"
 #include "core/scene.h"
+#include "path/weight.h"
 
 /* Whether the scattering numbered `bounce` is one too many; what it would have carried on is counted. */
 INLINE bool depth_is_reached(const Scene *scene, uint slot, uint bounce, Spectrum beta)
@@ -29,7 +30,7 @@ INLINE bool depth_is_reached(const Scene *scene, uint slot, uint bounce, Spectru
 INLINE float roulette_survival(const Scene *scene, uint bounce, float weight, bool at_surface)
 {
     const float early = CLVOL_ROULETTE == ROULETTE_WEIGHT && at_surface && bounce > 1 ? 0.5f : 0.0f;
-    const float least = bounce > scene->render->rr_depth ? 1.0f : early;
+    const float least = bounce > scene->render->rr_depth ? FOLLOWED_WEIGHT : early;
     return weight < least ? weight / least : 1.0f;
 }
 

@@ -28,7 +28,7 @@
    1.07 times as efficient as 1/2 on clouds under a sky, grey or not, and smoke in a room.  Where flights
    gather emission at strata, what a dark medium scatters is most of the noise: with an albedo of 0.3, 1/10 was 1.4
    times as efficient as 1/4, and 1.1 times as never. */
-#define MIXED_WEIGHT (CLVOL_FLIGHT_STRATA > 1 ? 0.1f : 0.3f)
+#define MIXED_WEIGHT (FOLLOWED_WEIGHT * (CLVOL_FLIGHT_STRATA > 1 ? 0.1f : 0.3f))
 
 #if CLVOL_HAS_SCATTERING
 /* Absorption at a collision (METHODS §2): by event, by weight, or by weight as long as the path's weight

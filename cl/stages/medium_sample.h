@@ -24,17 +24,21 @@ INLINE uint medium_sample(const Scene *scene, uint group, uint slot)
     const SampleKey key = path_key(scene, slot);
     const Ray ray = path_ray(scene, slot);
     const Walked walked = take_walked(scene, slot, 0.0f);
-    const MediumRay in = rest_of_ray(
+    MediumRay in = rest_of_ray(
         medium_ray(scene, scene->media, ray, path_medium_end(scene, slot), (int)path_channel(scene, slot)), walked.t);
+#if CLVOL_EXPECTS_BACKGROUND
+    in.rate = expecting_rate(scene, slot, in.rate);
+#endif
     const uint4 k = leg_block(decision_block(scene, key, BLOCK_WALK, 0), walked.leg);
     Tally tally = {0, 0, 0, 0, 0, 0, 0.0f};
     Collision collision;
     collision.beta = path_beta(scene, slot);
     collision.emission = (Spectrum)(0.0f);
-    const bool collided = medium_collision(&in, k, &tally, &collision);
+    bool collided = medium_collision(&in, k, &tally, &collision);
     const bool stopped = goes_on(walked, &tally);
 #if CLVOL_EXPECTS_BACKGROUND
-    expect_background(scene, slot, collision.through, !collided);
+    collided = expect_light(scene, slot, in.world_ray.o, collision.expected, collided, stopped, following_number(k));
+    tally.real = collided;
 #elif CLVOL_WEIGHTED
     subtract_background(scene, slot, in.medium, in.channel, collision.beta);
 #endif
@@ -43,7 +47,7 @@ INLINE uint medium_sample(const Scene *scene, uint group, uint slot)
 #endif
     record_walk(scene, slot, tally, collision.beta, collision.emission);
     uint event = path_event(scene, slot);
-    if (stopped) {
+    if (stopped && !(CLVOL_EXPECTS_BACKGROUND && collided)) {
         set_walked(scene, slot, walk_on(walked, walked.t, tally.stop_t));
         event = EVENT_WALK;
     } else if (collided) {

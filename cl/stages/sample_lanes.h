@@ -43,6 +43,9 @@ INLINE bool lane_begin(const Scene *scene, uint group, uint slot, LaneWalk *walk
     walk->from = walked.t;
     walk->in = rest_of_ray(medium_ray(scene, scene->media, ray, path_medium_end(scene, slot), channel), walked.t);
 #endif
+#if CLVOL_EXPECTS_BACKGROUND
+    walk->in.rate = expecting_rate(scene, slot, walk->in.rate);
+#endif
     lane_leg(walk, walked.leg);
     return true;
 }
@@ -56,15 +59,17 @@ INLINE void lane_end(const Scene *scene, uint group, const LanePath *path, const
 #if CLVOL_HAS_GLOW
     gather_glow(scene, path, walked.leg, arrival->happened || stopped ? arrival->t : path->length);
 #endif
-    record_tally(scene, slot, tally);
+    bool collided = arrival->happened;
 #if CLVOL_EXPECTS_BACKGROUND
-    expect_background(scene, slot, arrival->estimate, !arrival->happened);
+    collided = expect_light(scene, slot, path->start, arrival->expected, collided, stopped, following_number(path->k));
+    tally.real = collided;
 #endif
+    record_tally(scene, slot, tally);
     uint event = path_event(scene, slot);
-    if (stopped) {
+    if (stopped && !(CLVOL_EXPECTS_BACKGROUND && collided)) {
         set_walked(scene, slot, walk_on(walked, path->from, tally.stop_t));
         event = EVENT_WALK;
-    } else if (arrival->happened) {
+    } else if (collided) {
         set_path_medium(scene, slot, 0);
         set_path_origin(scene, slot, path->start + arrival->t * path_direction(scene, slot));
         event = EVENT_COLLISION;

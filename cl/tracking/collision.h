@@ -7,12 +7,22 @@
 #include "tracking/interface.h"
 #include "tracking/record.h"
 
+#if CLVOL_EXPECTS_BACKGROUND
+/* What a walk to the end of its stretch estimates (tracking/delta_through.h). */
+typedef struct {
+    float through; /* transmittance */
+    float caught;  /* chance of a collision */
+    float lit;     /* the same times the light of the sun that arrives */
+    float met_lit; /* that light at the collision that was chosen */
+} Expected;
+#endif
+
 typedef struct {
     float t;           /* out: ray parameter of the collision */
     Spectrum beta;     /* in and out: weight of the path */
     Spectrum emission; /* in and out: emitted light that reached the path's start, weighted */
 #if CLVOL_EXPECTS_BACKGROUND
-    float through; /* out: estimate of the transmittance of the whole stretch */
+    Expected expected; /* out */
 #endif
 } Collision;
 

@@ -11,6 +11,9 @@
 #define CLVOL_TRACKING_LANES_H
 #if CLVOL_LANES
 #include "core/lane_random.h"
+#if CLVOL_EXPECTS_BACKGROUND
+#include "tracking/collision.h"
+#endif
 #include "tracking/interface.h"
 
 /* What a walk begins with, and for the stage alone where on the path's ray. */
@@ -26,6 +29,9 @@ typedef struct {
     uint slot;
     float from;
     float3 start; /* in the world */
+#if CLVOL_EXPECTS_BACKGROUND
+    uint4 k; /* as LaneWalk's */
+#endif
 #if CLVOL_HAS_GLOW
     float length; /* of what was to be walked */
 #endif
@@ -36,13 +42,20 @@ typedef struct {
     float t;
     bool happened;  /* what ends walks of its tracker */
     float estimate; /* of transmittance */
+#if CLVOL_EXPECTS_BACKGROUND
+    Expected expected;
+#endif
     Tally tally;
 } LaneArrival;
 
 /* Where the walks stand.  Depths, and bounds of density, leave the medium's scale out. */
 typedef struct {
     Real t, t_end, bound, depth, estimate;
-    Real met; /* where they collided, of walks that go on behind */
+#if CLVOL_EXPECTS_BACKGROUND
+    Real share;                      /* of the rate of tentative collisions that the majorant asks for */
+    Real here;                       /* how much of the sun's light arrives */
+    Real met, met_lit, caught, lit;  /* the chosen collision, and sums (tracking/delta_through.h) */
+#endif
     LaneStream stream;
     Int lookups, cells, violations, happened, alive;
 } LaneState;

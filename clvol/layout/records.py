@@ -47,6 +47,11 @@ MEDIUM = _record(
     ("phase_count", "i", 1),
     ("sample_emitters", "i", 1),
     ("background", "f", 3),  # about what a ray inside will see: control of the weights' noise
+    (
+        "camera_rate",
+        "f",
+        1,
+    ),  # tentative collisions of camera paths, in what majorants ask for (background "expected")
     ("emits", "i", 1),
     ("emission", "f", 3),  # multiplies emission_volume and the blackbody, where there are any
     ("emission_volume", "i", 1),

@@ -43,7 +43,7 @@ def resolve(
         "absorption": ("mixed", "no path is absorbed that weighs much, none followed that weighs little"),
         "gathering": ("strata", "a point in each stratum of a flight has a fraction of one point's noise"),
         "roulette": _roulette(features),
-        "background": _background(features),
+        "background": ("expected", "walks that go on behind collisions take the noise of these away"),
         "probability": ("history", "weights stay bounded"),
         "control": ("mean", "leaves the least residual to estimate"),
         "shadow_cache": ("on", "shadow rays that would bring next to nothing are rarely traced"),
@@ -101,13 +101,6 @@ def _roulette(features: Features) -> tuple[str, str]:
     if features.reflecting:
         return "weight", "what weighs little after a surface is not worth following for rr_depth scatterings"
     return "depth", "no surface scatters"
-
-
-def _background(features: Features) -> tuple[str, str]:
-    """A sun is seen in what scatters it alone: collisions bring other light than what is behind."""
-    if not features.directional:
-        return "sampled", "collisions bring about as much light as what is behind"
-    return UNSETTLED, "expected where the medium is thin, which the volumes show once they are prepared"
 
 
 def _transmittance(features: Features) -> tuple[str, str]:

@@ -46,6 +46,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_EMISSION_ON_WALKS": int(f.emission and not f.media_overlap),
         "CLVOL_EMISSION_AT_COLLISIONS": int(f.emission and f.media_overlap),
         "CLVOL_EXPECTS_BACKGROUND": int(plan.expects_background),
+        "CLVOL_SUN_CONTROL": int(plan.sun_control),
         "CLVOL_FLIGHT_STRATA": plan.flight_strata,
         "CLVOL_HAS_EMISSION_VOLUME": int(f.emission_volumes),
         "CLVOL_HAS_GLOW": int(f.glow),

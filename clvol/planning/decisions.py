@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 from clvol import layout
 from clvol.planning import registry
 from clvol.planning.needs import MajorantNeeds
-from clvol.planning.settled import FAR_APART, Settled, Tuning
+from clvol.planning.settled import FAR_APART, THIN, Settled, Tuning
 
 if TYPE_CHECKING:
     from clvol.accel.controls import ResidualControl
@@ -150,13 +150,25 @@ class Decisions:
         """Walks might: through one medium alone, without surfaces, under lights at infinity."""
         f = self.features
         light = f.constant or f.envmap or f.directional
-        alone = f.media == 1 and f.heterogeneous and not f.surfaces and not f.emission and f.scattering
+        dark = not (f.emission or f.glow)
+        alone = f.media == 1 and f.heterogeneous and not f.surfaces and dark and f.scattering
         return light and alone and self.chosen["technique"] == "delta"
 
     @property
     def expects_background(self) -> bool:
         """Walks do."""
         return self.may_expect_background and self.chosen["background"] == "expected"
+
+    @property
+    def sun_control(self) -> bool:
+        """What they expect is by the light of a sun, too, as the cache of lights has it."""
+        return self.expects_background and self.light_cache and self.features.directional
+
+    @property
+    def camera_rate(self) -> int:
+        """How often walks of camera paths look up what they expect, in what majorants ask for."""
+        thin = self.settled is not None and self.settled.depth <= THIN
+        return 2 if thin and self.expects_background else 1
 
     @property
     def flight_strata(self) -> int:

@@ -74,7 +74,7 @@ def reasons(plan: Decisions) -> dict[str, str]:
         "absorption": "no medium scatters",
         "gathering": "no exact flight meets emission",
         "roulette": "no surface scatters" if features.scattering else "nothing scatters",
-        "background": "only delta tracking through one medium, without surfaces or emission, expects it",
+        "background": "only delta tracking through one medium, without surfaces or glow, expects it",
         "probability": "no path chooses between events by weights of several channels",
         "control": "only residual-ratio subtracts one",
         "sampler": "",

@@ -20,7 +20,6 @@ from clvol.planning.description import describe_plan
 from clvol.planning.in_force import biased_choices, need_bound, used_names
 from clvol.planning.inspection import find_features
 from clvol.planning.refusals import refuse_impossible
-from clvol.planning.settled import THIN
 from clvol.scene.boundaries import Boundaries, find_boundaries
 from clvol.scene.records import Batch
 
@@ -83,11 +82,6 @@ class Plan(Decisions):
         chosen, reasons = self.chosen.but(majorant=settled.majorant), self.reasons
         if settled.costs:
             reasons = reasons.but(majorant=settled.reason)
-        if chosen["background"] == UNSETTLED:
-            is_thin = settled.depth <= THIN
-            chosen = chosen.but(background="expected" if is_thin else "sampled")
-            depth = f"auto: the optical depth across the medium is about {settled.depth:.2g}"
-            reasons = reasons.but(background=depth)
         return replace(self, chosen=chosen, reasons=reasons, settled=settled)
 
     def renamed(self, **names: str) -> Plan:

@@ -165,7 +165,7 @@ GATHERINGS = {
 BACKGROUNDS = {
     "sampled": Choice("a walk that gets through a medium sees what is behind, one that collides does not"),
     "expected": Choice(
-        "by the transmittance, which walks go on to estimate: less noise of whether a path collides"
+        "by sums along walks that go on behind collisions: no noise of whether a path collides"
     ),
 }
 CONTROLS = {

@@ -13,8 +13,8 @@ samples fell short of the thin channel by 11, 20, 57 and 81 % at r = 1e-3, 1e-4,
 
 
 THIN = 1.0
-"""Optical depth across a medium up to which walks go on behind their collisions for what is behind.  In wisps
-of depth 0.4 under a sun it made pictures 1.3 times as efficient."""
+"""Optical depth across a medium up to which what camera rays meet is most of the noise, and worth twice as
+many look-ups."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from clvol.scene.thinness import thin_media
 from clvol.tables.affine import centred, from_centred, rows_3x4
 from clvol.tables.apart import peak_extinction
 from clvol.tables.blackbody import blackbody_rgb
-from clvol.tables.colours import rgb
+from clvol.tables.colours import luminance, rgb
 from clvol.tables.phases import has_varied_lobes
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def medium_table(prepared: PreparedScene) -> np.ndarray:
     entries, matter = prepared.boundaries.entries, prepared.matter
     table = np.zeros(len(entries), layout.MEDIUM)
     cell_offset = kd_root = links_first = phase_first = 0
-    sky, suns = mean_incident_radiance(prepared.scene)
+    sky, suns = mean_incident_radiance(prepared.scene, prepared.plan.sun_control)
     alone = prepared.surfaces is None
     varied = has_varied_lobes(entries)
     boxes = entry_bounds(prepared.scene, prepared.boundaries)
@@ -54,6 +54,7 @@ def medium_table(prepared: PreparedScene) -> np.ndarray:
         depth = most_depth(peak_extinction(medium, volume), box)
         caught = -np.expm1(-depth)  # a sun is seen in what scatters it alone
         record["background"] = (sky + suns * caught) * expected_albedo(medium) * alone
+        record["camera_rate"] = prepared.plan.camera_rate
         record["transfer"] = -1 if medium.transfers is None else len(layout.ENUMS["TRANSFER"]) * number
         record["sigma_t_volume"] = roles.get("sigma_t", -1)
         record["albedo_volume"] = roles.get("albedo", -1)
@@ -107,13 +108,15 @@ def _clip_to(record: np.void, box: tuple[np.ndarray, np.ndarray], centre: np.nda
     record["box_lower"], record["box_upper"] = box[0] - centre - slack, box[1] - centre + slack
 
 
-def mean_incident_radiance(scene: records.Scene) -> tuple[np.ndarray, np.ndarray]:
+def mean_incident_radiance(
+    scene: records.Scene, but_strongest: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
     """Mean over all directions of the radiance that arrives from infinity, float64 (3,).
 
     That of the sky and of suns, which no ray meets; 0 where a limit of depth keeps most of it from the
-    picture.
+    picture.  but_strongest : without the strongest directional light, which is expected by where it reaches.
     """
-    sky, suns = np.zeros(3), np.zeros(3)
+    sky, suns, strongest = np.zeros(3), np.zeros(3), np.zeros(3)
     if 0 <= scene.integrator.max_depth < 3:
         return sky, suns
     for emitter in scene.emitters:
@@ -121,14 +124,16 @@ def mean_incident_radiance(scene: records.Scene) -> tuple[np.ndarray, np.ndarray
             case records.ConstantEmitter():
                 sky += rgb(emitter.radiance)
             case records.DirectionalEmitter():
-                suns += rgb(emitter.irradiance) / (4 * np.pi)
+                sun = rgb(emitter.irradiance) / (4 * np.pi)
+                suns += sun
+                strongest = max(strongest, sun, key=luminance)
             case records.SunEmitter():
                 suns += rgb(emitter.irradiance) / (4 * np.pi)
             case records.EnvmapEmitter():
                 rows = emitter.radiance.mean(axis=1, dtype=np.float64)
                 weights = np.sin(np.pi * np.arange(len(rows)) / max(len(rows) - 1, 1)) + 1e-9
                 sky += np.average(rows, axis=0, weights=weights)
-    return sky, suns
+    return sky, suns - strongest * but_strongest
 
 
 def most_depth(extinction: np.ndarray, box: tuple[np.ndarray, np.ndarray]) -> np.ndarray:

@@ -149,8 +149,8 @@ def unit_of(plan, name):
     }.items():
         contracts |= {f"stages/{name}.h": layout.stage(stage) for name in names}
     macros = {"CLVOL_LANES": 8} if "lane" in name else {}
-    if name in ("stages/background.h", "tracking/delta_through.h"):
-        macros["CLVOL_EXPECTS_BACKGROUND"] = 1
+    if name in ("stages/background.h", "tracking/delta_through.h", "emitter/sunlit.h"):
+        macros |= {"CLVOL_EXPECTS_BACKGROUND": 1, "CLVOL_SUN_CONTROL": 1}
     if name == "stages/direction_control.h":  # not where a phase function is a table
         macros["CLVOL_DIRECTION_CONTROL"] = 1
     return programs.compose(plan, f'#include "{name}"\n', macros, stage=contracts.get(name))

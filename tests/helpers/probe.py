@@ -72,7 +72,7 @@ class Probe(SceneKernels):
     """A scene on the device, and kernels of one line over it."""
 
     def __init__(self, device, scene, **choices):
-        plan = Plan.of(scene, Choices(**({"majorant": "grid"} | choices)))
+        plan = Plan.of(scene, Choices(**({"majorant": "grid", "background": "sampled"} | choices)))
         super().__init__(device, on_device(prepare(scene, plan), device), seed=1)
 
     def upload(self, seed=1):

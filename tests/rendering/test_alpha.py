@@ -25,7 +25,7 @@ from clvol.scene.records import ConstantEmitter, ConstVolume, DirectionalEmitter
 from clvol.scene.views import TRANSPARENT, before
 
 CUBE = (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0)
-SKY, SUN = ConstantEmitter((0.3,)), DirectionalEmitter((0.6, -0.8, 0.0), (4.0,))
+SKY, SUN = ConstantEmitter((0.3,)), DirectionalEmitter((4.0,), (0.6, -0.8, 0.0))
 LAYERS = np.array([0.2, 1.0, 0.1, 0.0, 0.9], np.float32)
 DEPTH = 2.0 * float(LAYERS.mean())
 UNBIASED = [name for name, choice in registry.TECHNIQUES.items() if not choice.biased]

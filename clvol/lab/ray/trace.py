@@ -156,8 +156,14 @@ def _name(medium: Any) -> str:
 
 
 def _choices(scene: Scene, given: dict[str, Any]) -> Choices:
-    """The caller's choices, else the scene's, else auto."""
+    """The caller's choices, else the scene's, else auto; walks are watched up to their collisions."""
+    if given.get("background") == "expected":
+        raise OptionError(
+            "a ray shows where walks collide, behind which those of background 'expected' go on",
+            hint="leave the background out",
+        )
     names = {family: given[family] for family in registry.FAMILIES if family in given}
+    names["background"] = "sampled"
     choices = Choices.for_scene(scene, names, majorant_scale=given.get("majorant_scale", 1.0))
     return choices.but(step=given.get("step") if "marching" in choices.names.values() else None)
 
