@@ -46,7 +46,7 @@ def seen(medium, lights, eye=(0.5, 0.8, -4.0), **integrator):
 ABSORPTIONS = itertools.cycle(("sample", "weight", "mixed"))
 FURNACES = [(*pair, absorption) for pair, absorption in zip(PAIRS, ABSORPTIONS, strict=False)]
 COLOURS = {"grey": ((), 4.0), "coloured": ((3,), 3.0)}
-SKY = (2.0, 1.998, 2.0)
+SKY = (2.0, 2.0 - 2.0**-9, 2.0)
 
 
 @functools.cache
