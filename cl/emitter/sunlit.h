@@ -6,7 +6,8 @@
 #include "core/lanes.h"
 #include "emitter/light_cache.h"
 
-/* The cache's row of the strongest sun: of the first light, or of the last among those that follow. */
+/* The cache's row of the strongest sun: of the first light, or of the last among those that follow; 0 where no sun is
+   among the lights that it tells apart. */
 INLINE uint sun_row(const Scene *scene)
 {
     uint row = weighed_lights(scene) - 1u;

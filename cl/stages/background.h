@@ -42,7 +42,8 @@ INLINE Spectrum fully_lit(const Scene *scene, uint slot, float3 p, float3 wo)
     __global const Medium *medium = scene->media;
     __global const Emitter *sun = scene->emitters + weighed_light(scene, sun_row(scene));
     const int channel = (int)path_channel(scene, slot);
-    if (!medium->sample_emitters)
+    if (!medium->sample_emitters ||
+        sun->kind != EMITTER_DIRECTIONAL) /* a weak one that the cache does not tell apart */
         return (Spectrum)(0.0f);
     return to_spectrum(emitter_value(sun), channel) * medium_albedo(scene, medium, p, channel) *
            PHASE_PDF(p, wo, -load_vector(sun->vector));
