@@ -7,9 +7,8 @@ What stands in several places stands in the scene instead, with an id, and is re
 from __future__ import annotations
 
 from collections import Counter
-from numbers import Integral, Real
+from numbers import Real
 from typing import TYPE_CHECKING, Any, Protocol
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from clvol.scene.lookup import find
 from clvol.scene.nodes import NAMELESS, Node
 from clvol.scene.records import Mesh
 from clvol.scene.spectrum_plugins import SPECTRA
+from clvol.scene.xml_text import plain_parameter, quoted
 from clvol.volumes.grid import SparseGrid
 from clvol.volumes.read import split_address
 
@@ -77,7 +77,7 @@ class _Writer:
             lines = self.parameter(name, value, self.root)
             self.top += ["", *lines]
         for alias, (target, _) in self.root.aliases.items():
-            self.top.append(f"<alias id={_quoted(target)} as={_quoted(alias)}/>")
+            self.top.append(f"<alias id={quoted(target)} as={quoted(alias)}/>")
         head = [f"<!-- {comment.replace('--', '- -')} -->"] if comment else []
         inside = ["    " + line if line else "" for line in self.top]
         return "\n".join([*head, '<scene version="3.0.0">', *inside, "</scene>", ""])
@@ -90,7 +90,7 @@ class _Writer:
             self.shared[id(node)] = node.id or self._new_id(node)
             lines = self.element("", node, self.shared[id(node)])
             self.top += ["", *lines]
-        return [f"<ref{_name(name)} id={_quoted(self.shared[id(node)])}/>"]
+        return [f"<ref{_name(name)} id={quoted(self.shared[id(node)])}/>"]
 
     def element(self, name: str, node: Node, own: str) -> list[str]:
         """A plugin where it stands."""
@@ -105,7 +105,7 @@ class _Writer:
         if isinstance(values.get("grid"), SparseGrid):
             file, moved = self.files.sparse(values.pop("grid"))
             values |= {"filename": file, "to_world": values.get("to_world", np.eye(4)) @ moved}
-        opening = f"<{tag}{_name(name)} type={_quoted(given)}" + (f" id={_quoted(own)}" if own else "")
+        opening = f"<{tag}{_name(name)} type={quoted(given)}" + (f" id={quoted(own)}" if own else "")
         inside = [line for key, value in values.items() for line in self.parameter(key, value, node)]
         return (
             [f"{opening}>", *("    " + line for line in inside), f"</{tag}>"] if inside else [opening + "/>"]
@@ -113,22 +113,16 @@ class _Writer:
 
     def parameter(self, name: str, value: Any, owner: Node) -> list[str]:
         """The lines of one parameter."""
-        label = f"name={_quoted(name)}"
+        label = f"name={quoted(name)}"
         if isinstance(value, Node):
             return self._value(name, value) if _is_plain(value) else self.plugin(name, value)
-        if isinstance(value, bool | np.bool_):
-            return [f'<boolean {label} value="{str(bool(value)).lower()}"/>']
-        if isinstance(value, Integral):
-            return [f'<integer {label} value="{int(value)}"/>']
-        if isinstance(value, Real):
-            return [f'<float {label} value="{_numbers(value)}"/>']
-        if isinstance(value, str):
-            return [f"<string {label} value={_quoted(value)}/>"]
+        if plain := plain_parameter(name, value, _numbers):
+            return [plain]
         array = np.asarray(value)
         if name == "bitmap":
-            return [f'<string name="filename" value={_quoted(self.files.picture(array))}/>']
+            return [f'<string name="filename" value={quoted(self.files.picture(array))}/>']
         if name == "data":
-            return [f'<string name="filename" value={_quoted(self.files.volume(array))}/>']
+            return [f'<string name="filename" value={quoted(self.files.volume(array))}/>']
         if array.shape in ((3, 3), (4, 4)):
             matrix = array if len(array) == 4 else _in_space(array)
             return [f'<transform {label}><matrix value="{_numbers(matrix)}"/></transform>']
@@ -138,10 +132,10 @@ class _Writer:
     def _value(self, name: str, value: Node) -> list[str]:
         """A reference or a colour."""
         if value.type == "ref":
-            return [f"<ref{_name(name)} id={_quoted(value['id'])}/>"]
-        label = f"name={_quoted(name)}"
+            return [f"<ref{_name(name)} id={quoted(value['id'])}/>"]
+        label = f"name={quoted(name)}"
         if "filename" in value:
-            return [f"<spectrum {label} filename={_quoted(self._file(value, value['filename']))}/>"]
+            return [f"<spectrum {label} filename={quoted(self._file(value, value['filename']))}/>"]
         given = value["value"]
         if value.type == "rgb":
             if name in FACTORS and len(set(given)) == 1:
@@ -197,12 +191,7 @@ def _in_space(plane: np.ndarray) -> np.ndarray:
 
 
 def _name(name: str) -> str:
-    return "" if not name or name.startswith(NAMELESS) else f" name={_quoted(name)}"
-
-
-def _quoted(text: str) -> str:
-    """An attribute's value, whose dollar signs are no $names."""
-    return quoteattr(text.replace("$", "\\$"))
+    return "" if not name or name.startswith(NAMELESS) else f" name={quoted(name)}"
 
 
 def _numbers(values: Any) -> str:

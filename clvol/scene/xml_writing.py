@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from numbers import Integral, Real
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from clvol.scene.loader import PLUGINS
 from clvol.scene.sensor import is_rigid
+from clvol.scene.xml_text import plain_parameter
 
 Attach = Callable[[str, np.ndarray], str]
 """Puts an array where a scene can name it, by the parameter that has it; the file's name."""
@@ -58,14 +58,8 @@ def _value(name: str, value: Any, owner: Mapping[str, Any], attach: Attach) -> l
         if value["type"] != "rgb":
             return _plugin(name, value, attach)
         return [f'<rgb {label} value="{_numbers(value["value"])}"/>']
-    if isinstance(value, bool | np.bool_):
-        return [f'<boolean {label} value="{str(bool(value)).lower()}"/>']
-    if isinstance(value, Integral):
-        return [f'<integer {label} value="{int(value)}"/>']
-    if isinstance(value, Real):
-        return [f'<float {label} value="{_numbers(value)}"/>']
-    if isinstance(value, str):
-        return [f"<string {label} value={quoteattr(value.replace('$', chr(92) + '$'))}/>"]
+    if plain := plain_parameter(name, value, _numbers):
+        return [plain]
     if name in FILE_OF:
         file = attach(name, np.asarray(value))
         return [f'<string name="{FILE_OF[name]}" value={quoteattr(file)}/>']
