@@ -143,7 +143,11 @@ def test_clients_that_will_not_do_are_refused(client):
 
 
 def kill_while_rendering(client, which, expected):
-    """Kill workers once five samples are done."""
+    """Kill workers once five samples are done.
+
+    A cluster that starts no others is waited for, as renders do, but not for ever: the samples are
+    too few then.
+    """
     pids, done = list(client.run(os.getpid).values()), []
 
     def kill(record):
@@ -152,7 +156,7 @@ def kill_while_rendering(client, which, expected):
             for number in which:
                 os.kill(pids[number], signal.SIGKILL)
 
-    assert_same(clvol.render(scene(), client=client, progress=kill, **OPTIONS), expected)
+    assert_same(clvol.render(scene(), client=client, progress=kill, time_limit=180.0, **OPTIONS), expected)
     assert done
 
 
