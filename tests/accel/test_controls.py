@@ -307,6 +307,21 @@ def test_grids_and_global_bounds_cost_their_looseness(kind):
     )
 
 
+def test_grids_for_walks_in_lanes_have_the_cells_that_cost_these_least():
+    """And are told at the cost of walks one by one, which that of a kd-tree is."""
+    bounds = bounds_of(lumps(1))
+    rates = np.geomspace(1e-3, 1e3, 61)
+    alone = [costs.best_grid(bounds, EXTENT, rate) for rate in rates]
+    lanes = [costs.best_grid(bounds, EXTENT, rate, in_lanes=True) for rate in rates]
+    sizes = np.array(
+        [(one.cell_size, other.cell_size) for (one, _), (other, _) in zip(alone, lanes, strict=True)]
+    )
+    assert (sizes[:, 1] >= sizes[:, 0]).all() and (sizes[:, 1] > sizes[:, 0]).any()
+    for rate, (_, least), (other, told) in zip(rates, alone, lanes, strict=True):
+        edge = EXTENT * other.cell_size / bounds.cell_size
+        assert told == pytest.approx(costs.grid_cost(other, edge, rate)) and told >= least * (1 - 1e-9)
+
+
 def test_in_a_mean_every_merged_cell_counts_the_same():
     mean = np.random.default_rng(3).random((3, 4, 5, 2)).astype(np.float32)
     bounds = Bounds(mean, mean, 4, mean)

@@ -430,3 +430,19 @@ def test_a_unit_is_self_contained_and_names_files_and_lines(device):
     for text in units(plan_of(device, SCENES["everything"])).values():
         assert not re.search(r"^\s*#\s*include", text, re.M)
         assert '#line 1 "core/types.h"' in text
+
+
+# -- a uniform sky beside other lights ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("lights", "chosen", "mis"),
+    [((SKY, SUN), 1, False), ((SKY, SUN, LAMP), 2, False), ((ENVMAP, SUN), 2, True), ((SKY,), 1, True)],
+    ids=["a sun", "two lights", "a map", "alone"],
+)
+def test_a_uniform_sky_among_others_takes_no_shadow_ray(lights, chosen, mis):
+    described = scene([box(*CUBE, gridded(volume(LUMPS, *CUBE), 0.9))], lights)
+    plan = Plan.of(described, Choices(transmittance="ratio"))
+    assert (plan.features.sampled_emitters, plan.mis) == (chosen, mis)
+    result = clvol.render(described, spp=4, seed=1, transmittance="ratio")
+    assert result.stats["shadow_rays"] > 0
