@@ -116,6 +116,12 @@ CASES = {
     "a background": Case(
         "transparent", {}, {"technique": "delta", "background": "expected", "majorant": "grid"}
     ),
+    "a sun": Case("sunlit", {}, {"technique": "delta", "background": "expected", "majorant": "grid"}),
+    "a sun, lanes": Case(
+        "sunlit",
+        {},
+        {"technique": "delta", "background": "expected", "majorant": "grid", "lanes": "8"},
+    ),
     "transparent": Case("transparent", {}, {"background": "transparent", "majorant": "grid"}),
     "strata": Case(
         "an emitting medium",

@@ -197,6 +197,14 @@ def one_medium(**more: Any) -> clvol.Scene:
     )
 
 
+def sunlit() -> clvol.Scene:
+    """One heterogeneous medium under a sun and a sky."""
+    fog = {"type": "heterogeneous", "sigma_t": field(CELLS), "albedo": field(CELLS), "scale": 6.0}
+    sun, sky = {"type": "directional", "direction": (0.2, -1.0, 0.5)}, {"type": "envmap", "bitmap": PICTURE}
+    described = {"type": "scene", "integrator": {"type": "volpath", "max_depth": 4}, "sensor": pinhole()}
+    return clvol.load_dict(described | {"sun": sun, "sky": sky, "fog": box(fog)})
+
+
 def flakes() -> clvol.Scene:
     """Fog of microflakes under a sun."""
     phase = {"type": "sggx", "S": "0.5, 0.9, 0.1, 0.1, 0, 0"}
@@ -268,6 +276,7 @@ MADE = {
     "bends": lambda: balls(BENDS),
     "colours": colours,
     "flames": flames,
+    "sunlit": sunlit,
     "flakes": flakes,
     "woven": woven,
     "within": within,

@@ -65,7 +65,7 @@ def test_a_walk_is_given_up_after_its_last_leg(bounds):
 
 
 def session_of(device, kind, pool=256):
-    choices = Choices(majorant_scale=1e30 if kind == "majorant" else 1.0)
+    choices = Choices(majorant_scale=3e7 if kind == "majorant" else 1.0)
     scene = scene_of(kind) if kind in ("lumps", "sheets") else endless(kind)
     return Session.for_scene(device, scene, choices, 1, pool)
 

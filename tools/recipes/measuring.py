@@ -43,7 +43,8 @@ def costs(
 ) -> dict[str, Cost]:
     """Measure combinations of choices by turns; each render has a seed of its own."""
     device = open_device(None)
-    base = {"sampler": "independent", "lanes": "off"}
+    # background: walks of all techniques end at their collisions
+    base = {"sampler": "independent", "lanes": "off", "background": "sampled"}
     trials = {
         label: Trial.open(device, scene, Choices().but(**{**base, **names}))
         for label, names in combinations.items()
