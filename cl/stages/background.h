@@ -84,7 +84,7 @@ INLINE bool expect_light(const Scene *scene, uint slot, float3 p, Expected expec
         after = beta * (expected.caught / follows);
         added -= after * (inside + sunny * expected.met_lit);
     } else if (stopped) {
-        after = beta * (expected.through / (1.0f - follows));
+        after = beta * (expected.caught + expected.through); /* through / (1 - follows), that is */
         added -= after * inside;
     }
 #if CLVOL_HAS_ALPHA

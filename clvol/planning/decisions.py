@@ -167,8 +167,12 @@ class Decisions:
     @property
     def camera_rate(self) -> int:
         """How often walks of camera paths look up what they expect, in what majorants ask for."""
-        thin = self.settled is not None and self.settled.depth <= THIN
-        return 2 if thin and self.expects_background else 1
+        return 2 if self.depth_across <= THIN and self.expects_background else 1
+
+    @property
+    def depth_across(self) -> float:
+        """Optical depth across the medium, on the mean and about; infinite where nobody knows."""
+        return float("inf") if self.settled is None else self.settled.depth
 
     @property
     def flight_strata(self) -> int:

@@ -19,6 +19,8 @@ from clvol.tables.colours import luminance, rgb
 from clvol.tables.phases import has_varied_lobes
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from clvol.tables.prepare import PreparedScene
 
 BOUND_SLACK = 1e-5
@@ -53,7 +55,11 @@ def medium_table(prepared: PreparedScene) -> np.ndarray:
         _emission(record, medium, roles)
         depth = most_depth(peak_extinction(medium, volume), box)
         caught = -np.expm1(-depth)  # a sun is seen in what scatters it alone
-        record["background"] = (sky + suns * caught) * expected_albedo(medium) * alone
+        returned = expected_albedo(medium)
+        if prepared.plan.expects_background:
+            across = np.minimum(depth, prepared.plan.depth_across)
+            returned = np.maximum(returned, escaping_share(_mean_albedo(prepared, medium, roles), across))
+        record["background"] = (sky + suns * caught) * returned * alone
         record["camera_rate"] = prepared.plan.camera_rate
         record["transfer"] = -1 if medium.transfers is None else len(layout.ENUMS["TRANSFER"]) * number
         record["sigma_t_volume"] = roles.get("sigma_t", -1)
@@ -156,6 +162,34 @@ def expected_albedo(medium: records.Medium) -> np.ndarray:
         return np.zeros(3)
     s = np.sqrt(1.0 - rgb(medium.albedo.value))
     return np.sqrt((1 - s) * (1 - 0.139 * s) / (1 + 1.17 * s))
+
+
+def escaping_share(albedo: np.ndarray, depth: np.ndarray) -> np.ndarray:
+    """Share of the light in a medium that leaves it after any number of scatterings, float64 (3,).
+
+    By Wigner's rational approximation (Case, de Hoffmann, Placzek 1953), a flight from somewhere in a body
+    of mean optical depth d gets out of it with the probability 1 / (1 + d).  In the light of a uniform sky
+    it is what a collision brings, by reciprocity.  albedo, depth : (3,), `depth` may be infinite.
+    """
+    share: np.ndarray = albedo / (albedo + (1.0 - albedo) * (1.0 + np.minimum(depth, 1e9)))
+    return share
+
+
+def _mean_albedo(prepared: PreparedScene, medium: records.Medium, roles: Mapping[str, int]) -> np.ndarray:
+    """Mean albedo of a heterogeneous medium, float64 (3,): about, and of volumes where there is some.
+
+    Where a volume has the samples where the density has them, it is weighted by that.
+    """
+    if isinstance(medium.albedo, records.ConstVolume):
+        return rgb(medium.albedo.value)
+    albedo = prepared.volumes[roles["albedo"]].middles(medium.transfer("albedo"))
+    density = prepared.volumes[roles["sigma_t"]].middles(medium.transfer("sigma_t")).mean(axis=-1)
+    weights = (albedo > 0).any(axis=-1).astype(np.float64)
+    if density.shape == weights.shape:
+        weights *= density
+    total = float(weights.sum())
+    mean = np.tensordot(weights, albedo, weights.ndim) / total if total > 0 else np.zeros(1)
+    return np.broadcast_to(mean, 3).clip(0.0, 1.0)
 
 
 def _emission(record: np.void, medium: records.Medium, roles: dict[str, int]) -> None:

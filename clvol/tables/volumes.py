@@ -41,6 +41,17 @@ class PreparedVolume:
         _, peak = classified(np.array([lowest], np.float32), np.array([highest], np.float32), transfer)
         return peak.astype(np.float64)
 
+    def middles(self, transfer: Transfer | None) -> np.ndarray:
+        """Halfway between the extrema of each cube of 4³ cells, or of what is made of them.
+
+        float64 (..., channels); of a tree, in the bricks that it keeps.
+        """
+        low, high = self.bricks.minimum, self.bricks.maximum
+        if transfer is not None:
+            low, high = classified(low, high, transfer)
+        middles: np.ndarray = 0.5 * (low.astype(np.float64) + high)
+        return middles
+
     @property
     def edges(self) -> np.ndarray:
         """A voxel's edges in the world, the columns of a float64 (3, 3)."""

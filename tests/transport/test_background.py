@@ -63,7 +63,8 @@ def test_it_is_less_noisy_where_the_transmittance_is_well_known(way):
 @pytest.mark.parametrize("wrong", [0.0, 4.0, -3.0], ids=["zero", "too bright", "negative"])
 @pytest.mark.parametrize("way", WAYS[:2], ids=lambda way: "-".join(way.values()))
 def test_any_guess_of_what_collisions_bring_has_the_same_mean(monkeypatch, way, wrong):
-    monkeypatch.setattr(media, "expected_albedo", lambda medium: np.full(3, wrong))
+    for guess in ("expected_albedo", "escaping_share"):
+        monkeypatch.setattr(media, guess, lambda *_: np.full(3, wrong))
     options = {"technique": "delta", "background": "expected"} | way
     result = render(scene(), spp=1 << 11, seed=seed_of("guess", wrong, *way.values()), **options)
     assert_same_picture(result, shown("sampled", **WAYS[0]))
@@ -150,6 +151,30 @@ def test_it_is_less_noisy_in_thin_media_under_a_sun():
     thin = {"limits": (("scale", 0.3), ("lights", (SUN,))), "spp": 64, "lanes": "16", "majorant": "grid"}
     noise = {name: shown(name, **thin).noise for name in ("expected", "sampled")}
     assert noise["expected"] < 0.7 * noise["sampled"]
+
+
+WHITE = {
+    "constant": 0.99,
+    "volume": volume(np.random.default_rng(2).uniform(0.8, 1.0, (5, 5, 5)), *CUBE),
+    "where the medium is": volume(np.where(LUMPS > 0.1, 0.9, 0.2), *CUBE),
+}
+
+
+@pytest.mark.parametrize("scale", [0.2, 4.0])
+@pytest.mark.parametrize("albedo", WHITE)
+def test_it_is_less_noisy_where_scattered_light_is_nearly_what_is_behind(albedo, scale):
+    """A path that collides brings nearly the sky that it hides: chance makes little noise there, too."""
+    white = (("scale", scale), ("lights", (SKY,)), ("albedo", WHITE[albedo]))
+    options = {"spp": 256, "limits": white, "sampler": "independent", "lanes": "16", "majorant": "grid"}
+    noise = {name: shown(name, **options).noise for name in ("expected", "sampled")}
+    assert noise["expected"] < 0.8 * noise["sampled"]
+
+
+def test_what_escapes_of_the_light_in_a_medium_is_known_at_its_limits():
+    depth = np.array([0.0, 1.0, np.inf])
+    assert media.escaping_share(np.ones(3), depth) == pytest.approx(1.0)
+    assert media.escaping_share(np.zeros(3), depth) == pytest.approx(0.0)
+    assert media.escaping_share(np.full(3, 0.5), depth) == pytest.approx([0.5, 1 / 3, 0.0], abs=1e-8)
 
 
 def test_it_is_taken_wherever_walks_can():
