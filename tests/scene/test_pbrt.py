@@ -258,6 +258,25 @@ def test_media_round_the_camera_and_without_a_boundary(load):
     assert scene.shapes[0].interior is None and scene.shapes[0].exterior is scene.sensor.medium
 
 
+@pytest.mark.parametrize(
+    ("name", "scattering", "g", "absorption"),  # red, of the papers' tables
+    [
+        ("Skin1", 0.74, 0.0, 0.032),
+        ("Lowfat Milk", 13.1157, 0.932, 0.00287),
+        ("Head & Shoulders Shampoo", 0.26747, 0.911, 0.08462),
+        ("Suisse Mocha Powder", 30.0848, 0.907, 17.5020),
+    ],
+)
+def test_measured_media_have_the_papers_reduced_coefficients(load, name, scattering, g, absorption):
+    scene = load(
+        f'MakeNamedMedium "m" "string type" "homogeneous" "string preset" "{name}" "float scale" 2 '
+        'MediumInterface "m" "" Material "interface" Shape "sphere"'
+    )
+    medium, reduced = scene.shapes[0].interior, scattering * (1 - g)
+    assert 2 * (reduced + absorption) == pytest.approx(medium.sigma_t.value[0] * medium.scale[0], rel=2e-3)
+    assert medium.albedo.value[0] == pytest.approx(reduced / (reduced + absorption), rel=2e-3)
+
+
 def test_a_boundary_without_media_is_nothing_and_path_sees_none(load):
     medium = 'MakeNamedMedium "m" "string type" "homogeneous" MediumInterface "m" ""'
     assert not load('Material "interface" Shape "sphere"').shapes
