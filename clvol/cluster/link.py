@@ -44,17 +44,24 @@ class Link:
         self._counted, self._workers = -_COUNT_SECONDS, 0
         self._pending: set[Any] = set()
         self._names = 0
-        self._said_waiting = False
+        self._had_any = self._said_waiting = False
 
     def count(self) -> int:
         """Workers there are, at most `_COUNT_SECONDS` ago."""
         now = time.perf_counter()
         if now - self._counted > _COUNT_SECONDS:
             self._workers, self._counted = len(self.asked(self._client.nthreads)), time.perf_counter()
-            if not self._workers and not self._said_waiting:
-                self._said_waiting = True
-                log.warning("the cluster has no workers yet: waiting for the first")
+            self._say_waiting()
         return self._workers
+
+    def _say_waiting(self) -> None:
+        """Warn once where there is no worker, and anew when all there were are gone."""
+        if self._workers:
+            self._had_any, self._said_waiting = True, False
+        elif not self._said_waiting:
+            self._said_waiting = True
+            what = "no workers any more" if self._had_any else "no workers yet"
+            log.warning("the cluster has %s: waiting for some; Ctrl-C ends the render", what)
 
     def asked(self, ask: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
         """What the scheduler answers; RenderError where it is gone."""

@@ -13,7 +13,7 @@ from every_bit import scene
 from signals import press_key
 
 import clvol
-from clvol.cluster import job, on_worker
+from clvol.cluster import job, link, on_worker
 from clvol.scene.records import Batch
 
 OPTIONS = {"spp": 40, "seed": 3, "sampler": "joint", "aov": ["depth", "largest_weight"]}
@@ -172,6 +172,22 @@ def test_all_workers_may_be_killed_and_with_them_what_they_had_of_the_scene(expe
         for which in ([0, 1], [1], [0, 1]):
             client.wait_for_workers(2)
             kill_while_rendering(client, which, expected)
+
+
+def test_a_cluster_without_workers_is_told_of_once_and_anew_when_all_are_gone(monkeypatch, caplog):
+    there = []
+    client = SimpleNamespace(status="running", nthreads=lambda: there)
+    monkeypatch.setattr(link, "check_client", lambda client: client)
+    monkeypatch.setattr(link, "_COUNT_SECONDS", -1.0)
+    asked = link.Link(client)
+    for workers in ([], [], ["a", "b"], ["a"], [], []):
+        there[:] = workers
+        assert asked.count() == len(workers)
+    told = [record.message for record in caplog.records]
+    assert [message.split(":")[0] for message in told] == [
+        "the cluster has no workers yet",
+        "the cluster has no workers any more",
+    ]
 
 
 @pytest.mark.contract
