@@ -1,9 +1,12 @@
 """Sampler joint where a path chooses among lights: its four parts must not agree in light and flight."""
 
 import numpy as np
-import pytest
+from tiers import quick_first
 
 import clvol
+from clvol.device.device import open_device
+from clvol.lab.trials import Trial
+from clvol.planning.choices import Choices
 
 SEEDS = 80
 PLACES = ([0.5, -0.25, 0.9], [0.5, 1.25, 0.1], [-0.3, 0.5, 0.5], [1.3, 0.5, 0.5])
@@ -40,15 +43,14 @@ def fog(lights):
 
 def noise(scene, sampler):
     """The variance of a pixel over seeds, and that told, means over the picture."""
-    results = [
-        clvol.render(scene, spp=16, seed=seed, sampler=sampler, light_choice="power") for seed in range(SEEDS)
-    ]
+    trial = Trial.open(open_device(None), scene, Choices(sampler=sampler, light_choice="power"))
+    results = [trial.render(seed, 16) for seed in range(SEEDS)]
     pixels = np.array([result.image[..., 0] for result in results], float)
     told = np.mean([result.variance[..., 0] for result in results])
     return pixels.var(axis=0, ddof=1).mean(), told
 
 
-@pytest.mark.parametrize("lights", [2, 4])
+@quick_first("lights", [2, 4])
 def test_the_noise_is_told_and_no_larger_than_with_independent_parts(lights):
     """Of 36 pixels and 80 seeds: the variance is known to about 3 %.
 
