@@ -10,15 +10,21 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from clvol.scene import records
+from clvol.scene.extents import CLOSED, bounds_of, is_open, openness, shape_bounds
 from clvol.scene.materials import Null
-from clvol.scene.primitives import mesh_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
 
 CONVEX = ("cube", "sphere")
 """Kinds of shape that a ray meets in one span, found in closed form."""
+GOES_ROUND = 0.5
+"""Openness below which shapes go round a place, as a cup does."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +43,19 @@ class MediumEntry:
 
 @dataclass(frozen=True)
 class Boundary:
-    """A shape that divides media: its index among the scene's shapes, and entries (-1: none)."""
+    """A surface that divides media: the indices of its shapes among the scene's, and entries (-1: none).
 
-    shape: int
+    Closed shapes are each a surface of its own; all open ones that divide the same media are one together, as
+    the walls of a room: light that enters by one leaves by another.
+    """
+
+    shapes: tuple[int, ...]
     interior: int
     exterior: int
+
+    def of(self, scene: records.Scene) -> list[records.Shape]:
+        """Its shapes."""
+        return [scene.shapes[index] for index in self.shapes]
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,14 +117,31 @@ def find_boundaries(scene: records.Scene) -> Boundaries:
         if medium is not None and id(medium) not in known:
             known.add(id(medium))
             entries.append(MediumEntry(medium, None, True))
-    boundaries = tuple(
-        Boundary(
-            index,
-            *(-1 if m is None else entry_of[id(m)] for m in (shapes[index].interior, shapes[index].exterior)),
+    sides = {
+        index: tuple(
+            -1 if m is None else entry_of[id(m)] for m in (shapes[index].interior, shapes[index].exterior)
         )
         for index in dividing
-    )
+    }
+    boundaries = tuple(Boundary(tuple(parts), *sides[parts[0]]) for parts in _surfaces_of(shapes, sides))
     return Boundaries(tuple(surfaces), tuple(entries), boundaries)
+
+
+def _surfaces_of(shapes: Sequence[records.Shape], sides: dict[int, tuple[int, ...]]) -> Iterable[list[int]]:
+    """The shapes that divide media, by the surfaces that they make up."""
+    alike = Counter(sides.values())
+    surfaces: list[list[int]] = []
+    sheets: dict[tuple[int, ...], list[int]] = {}
+    for index, media in sides.items():
+        if alike[media] > 1 and is_open(shapes[index]):
+            if media in sheets:
+                sheets[media].append(index)
+                continue
+            sheets[media] = [index]
+            surfaces.append(sheets[media])
+        else:
+            surfaces.append([index])
+    return surfaces
 
 
 def _is_interval(shape: records.Shape, exteriors: set[int], holders: Counter[int]) -> bool:
@@ -129,37 +160,6 @@ def _is_interval(shape: records.Shape, exteriors: set[int], holders: Counter[int
     )
 
 
-def shape_bounds(shape: records.Shape) -> tuple[np.ndarray, np.ndarray]:
-    """Axis-aligned world bounds (lower, upper) of a shape, float64 (3,)."""
-    linear, centre = shape.to_world[:3, :3], shape.to_world[:3, 3]
-    if shape.kind == "mesh":
-        return mesh_bounds(shape)
-    if shape.kind == "sphere":
-        extent = np.sqrt((linear**2).sum(axis=1))
-    elif shape.kind == "cube":
-        extent = np.abs(linear).sum(axis=1)
-    elif shape.kind == "rectangle":
-        extent = np.abs(linear[:, :2]).sum(axis=1)
-    else:
-        extent = np.sqrt((linear[:, :2] ** 2).sum(axis=1))
-        if shape.kind == "cylinder":
-            top = centre + linear[:, 2]
-            return np.minimum(centre, top) - extent, np.maximum(centre, top) + extent
-    return centre - extent, centre + extent
-
-
-def mesh_bounds(shape: records.Shape) -> tuple[np.ndarray, np.ndarray]:
-    """World bounds of the vertices that faces use."""
-    mesh = mesh_of(shape)
-    used = np.unique(mesh.faces)
-    linear, offset = shape.to_world[:3, :3], shape.to_world[:3, 3]
-    lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
-    for start in range(0, len(used), 1 << 16):
-        points = mesh.vertices[used[start : start + (1 << 16)]] @ linear.T + offset
-        lower, upper = np.minimum(lower, points.min(axis=0)), np.maximum(upper, points.max(axis=0))
-    return lower, upper
-
-
 def is_clipped(medium: records.Medium) -> bool:
     """Whether the box of the sigma_t volume bounds the medium beside its shape."""
     if medium.homogeneous:
@@ -167,29 +167,52 @@ def is_clipped(medium: records.Medium) -> bool:
     return not isinstance(medium.sigma_t, records.GridVolume) or medium.sigma_t.clipped
 
 
-def _holders(found: Boundaries) -> dict[int, list[Boundary]]:
-    """The boundaries that hold each medium, by the number of its entry."""
-    held: dict[int, list[Boundary]] = {number: [] for number in range(-1, len(found.entries))}
+def _naming(found: Boundaries, side: str) -> dict[int, list[Boundary]]:
+    """The boundaries that have each medium as their `interior`, or `exterior`, by the number of its entry."""
+    named: dict[int, list[Boundary]] = {number: [] for number in range(-1, len(found.entries))}
     for boundary in found.boundaries:
-        held[boundary.interior].append(boundary)
-    return held
+        named[getattr(boundary, side)].append(boundary)
+    return named
 
 
 def entry_bounds(scene: records.Scene, found: Boundaries) -> list[tuple[np.ndarray, np.ndarray]]:
     """World bounds of each medium: of the shape, or of all boundaries that hold it.
 
-    They are infinite where a medium is everywhere.
+    They are infinite where a medium is everywhere.  What open shapes hold, as the front of a room of
+    rectangles, reaches as far as all that name it, or as the whole scene where these do not go round it, as
+    the surface of a lake.
     """
-    boxes, holders = [], _holders(found)
+    boxes, holders, keepers = [], _naming(found, "interior"), _naming(found, "exterior")
     for number, entry in enumerate(found.entries):
         if entry.everywhere:
             boxes.append((np.full(3, -np.inf), np.full(3, np.inf)))
             continue
-        held = [scene.shapes[b.shape] for b in holders[number]]
-        parts = [shape_bounds(s) for s in ([entry.shape] if entry.shape is not None else []) + held]
-        lower, upper = zip(*parts, strict=True)
-        boxes.append((np.min(lower, axis=0), np.max(upper, axis=0)))
+        parts = [] if entry.shape is None else [entry.shape]
+        parts += [shape for b in holders[number] for shape in b.of(scene)]
+        if openness(parts) > CLOSED:
+            outer = [shape for b in keepers[number] for shape in b.of(scene)]
+            parts = parts + outer if openness(parts, outer) < GOES_ROUND else _all_shapes(scene, found)
+        boxes.append(bounds_of(parts))
     return boxes
+
+
+def closed_together(scene: records.Scene, found: Boundaries) -> set[int]:
+    """Indices of shapes that bound media together with others, without a gap, as the walls of a room."""
+    holders, keepers = _naming(found, "interior"), _naming(found, "exterior")
+    gaps, named = set(), set()
+    for number in range(len(found.entries)):
+        sides = [[s for b in named_by[number] for s in b.of(scene)] for named_by in (holders, keepers)]
+        indices = {index for b in (*holders[number], *keepers[number]) for index in b.shapes}
+        named |= indices
+        if openness(*sides) > CLOSED:
+            gaps |= indices
+    return named - gaps
+
+
+def _all_shapes(scene: records.Scene, found: Boundaries) -> list[records.Shape]:
+    """All that rays can meet: surfaces, and media in their spans."""
+    shapes = [scene.shapes[n] for n in found.surfaces]
+    return shapes + [e.shape for e in found.entries if e.shape is not None]
 
 
 def scene_sphere(scene: records.Scene, found: Boundaries) -> tuple[np.ndarray, float]:
@@ -197,12 +220,10 @@ def scene_sphere(scene: records.Scene, found: Boundaries) -> tuple[np.ndarray, f
 
     The camera's place where there is nothing.
     """
-    shapes = [scene.shapes[n] for n in found.surfaces]
-    shapes += [e.shape for e in found.entries if e.shape is not None]
-    corners = [corner for s in shapes for corner in shape_bounds(s)]
-    if not corners:
+    shapes = _all_shapes(scene, found)
+    if not shapes:
         return scene.camera.to_world[:3, 3].copy(), 1.0
-    lower, upper = np.min(corners, axis=0), np.max(corners, axis=0)
+    lower, upper = bounds_of(shapes)
     return (lower + upper) / 2, float(np.linalg.norm(upper - lower)) / 2
 
 
@@ -212,7 +233,7 @@ def may_overlap(scene: records.Scene, found: Boundaries) -> bool:
     They cannot where their bounds are apart, or where all that holds the one keeps out the other.
     """
     boxes = np.array(entry_bounds(scene, found)).reshape(-1, 2, 3)
-    lower, upper, holders = boxes[:, 0], boxes[:, 1], _holders(found)
+    lower, upper, holders = boxes[:, 0], boxes[:, 1], _naming(found, "interior")
     for a in range(len(boxes)):
         meet = ((lower[a] < upper[:a]) & (lower[:a] < upper[a])).all(axis=1)
         for b in np.flatnonzero(meet).tolist():
@@ -233,7 +254,7 @@ def camera_may_be_inside(scene: records.Scene, found: Boundaries) -> bool:
     """Conservative: whether rays may start within a boundary's bounds."""
     low, high = _starts_of_rays(scene.camera, scene.film)
     for boundary in found.boundaries:
-        lower, upper = shape_bounds(scene.shapes[boundary.shape])
+        lower, upper = bounds_of(boundary.of(scene))
         if (high >= lower).all() and (low <= upper).all():
             return True
     return False

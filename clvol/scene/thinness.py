@@ -8,7 +8,8 @@ import numpy as np
 
 from clvol.errors import SceneError
 from clvol.scene import records
-from clvol.scene.boundaries import Boundaries, MediumEntry, is_clipped, scene_sphere, shape_bounds
+from clvol.scene.boundaries import Boundaries, MediumEntry, is_clipped, scene_sphere
+from clvol.scene.extents import shape_bounds
 from clvol.scene.medium_facts import medium_volumes
 from clvol.scene.primitives import mesh_of
 
@@ -77,8 +78,7 @@ def check_thinness(scene: records.Scene, found: Boundaries) -> None:
                     "smaller or evenly placed round it",
                 )
     eye = scene.camera.to_world[:3, 3]
-    for boundary in found.boundaries:
-        shape = scene.shapes[boundary.shape]
+    for boundary, shape in ((b, shape) for b in found.boundaries for shape in b.of(scene)):
         lower, upper = shape_bounds(shape)
         way = np.linalg.norm(np.maximum(np.maximum(lower - eye, eye - upper), 0))
         way = max(way, np.abs(lower - centre).max(), np.abs(upper - centre).max())

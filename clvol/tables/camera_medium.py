@@ -114,26 +114,35 @@ def _surrounds(scene: records.Scene, found: Boundaries, medium: records.Medium) 
             continue
         presence += int(entry.everywhere)
         if entry.shape is not None:
-            presence += starts_inside(entry.shape, starts, towards)
+            presence += starts_inside([entry.shape], starts, towards)
         for boundary in found.boundaries:
             sign = int(boundary.interior == number) - int(boundary.exterior == number)
             if sign:
-                presence += sign * starts_inside(scene.shapes[boundary.shape], starts, towards)
+                presence += sign * starts_inside(boundary.of(scene), starts, towards)
     return bool((presence > 0).all())
 
 
-def starts_inside(shape: records.Shape, starts: np.ndarray, towards: np.ndarray) -> np.ndarray:
-    """Whether rays (n, 3), (n, 3) start behind a shape's surface: where their first crossing leads out."""
+def starts_inside(shapes: list[records.Shape], starts: np.ndarray, towards: np.ndarray) -> np.ndarray:
+    """Whether rays (n, 3), (n, 3) start behind a surface of these shapes: their first crossing leads out."""
+    nearest, behind = np.full(len(starts), np.inf), np.zeros(len(starts), bool)
+    for shape in shapes:
+        t, outwards = _first_crossing(shape, starts, towards)
+        behind = np.where(t < nearest, outwards != shape.flip_normals, behind)
+        nearest = np.minimum(t, nearest)
+    return behind
+
+
+def _first_crossing(
+    shape: records.Shape, starts: np.ndarray, towards: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Distance, inf where there is none, and whether it leads to the shape's front."""
     inverse = np.linalg.inv(shape.to_world)
     o, d = starts @ inverse[:3, :3].T + inverse[:3, 3], towards @ inverse[:3, :3].T
     if shape.kind == "disk":
-        t, outwards = _disk(o, d)
-    elif shape.kind in ("sphere", "cylinder"):
-        t, outwards = _round(shape.kind, o, d)
-    else:
-        t, outwards = _triangles(mesh_of(shape), o, d)
-    behind: np.ndarray = np.isfinite(t) & (outwards != shape.flip_normals)
-    return behind
+        return _disk(o, d)
+    if shape.kind in ("sphere", "cylinder"):
+        return _round(shape.kind, o, d)
+    return _triangles(mesh_of(shape), o, d)
 
 
 def _disk(o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

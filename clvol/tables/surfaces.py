@@ -16,7 +16,8 @@ from clvol import layout
 from clvol.accel.bvh import Bvh, build_bvh, check_mesh, drop_degenerate
 from clvol.base.memory import available_memory, format_bytes
 from clvol.errors import SceneError
-from clvol.scene.boundaries import Boundaries, shape_bounds
+from clvol.scene.boundaries import closed_together
+from clvol.scene.extents import shape_bounds
 from clvol.scene.material_facts import is_transmissive, passes_light
 from clvol.scene.mesh import MAX_INDICES, mesh_flaws
 from clvol.scene.orientation import facing_outwards
@@ -25,6 +26,7 @@ from clvol.tables.affine import centred, rows_3x4
 
 if TYPE_CHECKING:
     from clvol.scene import records
+    from clvol.scene.boundaries import Boundaries
 
 log = logging.getLogger("clvol")
 
@@ -62,7 +64,8 @@ def prepare_surfaces(scene: records.Scene, found: Boundaries, centre: np.ndarray
     shapes = [scene.shapes[index] for index in found.surfaces]
     if not shapes:
         return None
-    bits = {b.shape: bit for bit, b in enumerate(found.boundaries)}
+    bits = {index: bit for bit, b in enumerate(found.boundaries) for index in b.shapes}
+    shut = closed_together(scene, found)
     table = np.zeros(len(shapes), layout.SHAPE)
     meshes, quadrics, boxes = [], [], []
     for number, (record, shape, index) in enumerate(zip(table, shapes, found.surfaces, strict=True)):
@@ -71,7 +74,7 @@ def prepare_surfaces(scene: records.Scene, found: Boundaries, centre: np.ndarray
         record["flip"] = int(shape.flip_normals)
         record["boundary"] = bits.get(index, -1)
         if index in bits:
-            shape = shapes[number] = _outward(shape)
+            shape = shapes[number] = _outward(shape, index in shut)
         if kind == "mesh":
             meshes.append((number, shape))
             continue
@@ -172,16 +175,17 @@ def _transform_normals(normals: np.ndarray, linear: np.ndarray, out: np.ndarray)
         out[part] = np.divide(moved, length, out=np.zeros_like(moved), where=length > 0)
 
 
-def _outward(shape: records.Shape) -> records.Shape:
+def _outward(shape: records.Shape, shut: bool) -> records.Shape:
     """A shape that bounds a medium, closed parts that face inwards turned, with a warning.
 
-    Warns also of a shape that light passes through and that is no closed, outward surface.
+    Warns also of a shape that light passes through and that is no closed, outward surface.  shut : together
+    with others it is closed.
     """
     if not (passes_light(shape.bsdf) or is_transmissive(shape.bsdf)):
         return shape
     name = shape.name or (shape.mesh.source if shape.mesh else shape.kind)
     if shape.kind in ("rectangle", "disk", "cylinder"):
-        flaws = [f"a {shape.kind} is open"]
+        flaws = [] if shut else [f"a {shape.kind} is open"]
     elif shape.kind == "sphere":
         flaws = _turned([], shape.flip_normals)
     else:

@@ -11,7 +11,7 @@ import numpy as np
 
 from clvol.errors import OptionError
 from clvol.scene.assignments import value_of
-from clvol.scene.boundaries import shape_bounds
+from clvol.scene.extents import shape_bounds
 from clvol.scene.parameters import traverse
 from clvol.scene.records import Perspective
 from clvol.scene.transforms import rotate

@@ -164,11 +164,11 @@ def test_what_rays_start_inside_of():
     mirrored = clvol.translate([0.2, 0.1, 0.3]) @ clvol.rotate([1, 2, 3], 40) @ clvol.scale([-1.2, 1.2, 1.2])
     inside = np.linalg.norm(starts - [0.2, 0.1, 0.3], axis=1) < 1.2
     for shape in (Shape("sphere", mirrored), replace(icosphere(level=4), to_world=mirrored)):
-        found = starts_inside(shape, starts, towards)
+        found = starts_inside([shape], starts, towards)
         assert (found == inside).mean() > 0.99  # a mesh of a ball is a little smaller
-        turned = starts_inside(replace(shape, flip_normals=True), starts, towards)
+        turned = starts_inside([replace(shape, flip_normals=True)], starts, towards)
         assert not (turned & found).any() and turned.any()
-    cube = starts_inside(Shape("cube", np.eye(4)), starts, towards)
+    cube = starts_inside([Shape("cube", np.eye(4))], starts, towards)
     np.testing.assert_array_equal(cube, (np.abs(starts) < 1).all(axis=1))
 
 
@@ -176,9 +176,9 @@ def test_open_shapes_have_an_inside_where_rays_leave_by_their_front():
     starts, up = np.array([[0.1, 0.2, -1.0], [0.1, 0.2, 1.0], [3.0, 0.0, -1.0]]), np.array([[0, 0, 1.0]] * 3)
     for kind in ("rectangle", "disk"):
         shape = Shape(kind, np.eye(4))
-        assert starts_inside(shape, starts, up).tolist() == [True, False, False]
-        assert starts_inside(shape, starts, -up).tolist() == [False, False, False]
+        assert starts_inside([shape], starts, up).tolist() == [True, False, False]
+        assert starts_inside([shape], starts, -up).tolist() == [False, False, False]
     aside = np.array([[1.0, 0.1, 0.01]] * 3)
     cylinder = Shape("cylinder", np.eye(4))
-    assert starts_inside(cylinder, starts + np.array([0, 0, 1.3]), aside).tolist() == [True, False, False]
-    assert starts_inside(cylinder, np.array([[0.1, 0.2, -5.0]]), np.array([[0.55, 0.0, 3.5]])).all()
+    assert starts_inside([cylinder], starts + np.array([0, 0, 1.3]), aside).tolist() == [True, False, False]
+    assert starts_inside([cylinder], np.array([[0.1, 0.2, -5.0]]), np.array([[0.55, 0.0, 3.5]])).all()
