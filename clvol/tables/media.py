@@ -59,6 +59,7 @@ def medium_table(prepared: PreparedScene) -> np.ndarray:
         if prepared.plan.expects_background:
             across = np.minimum(depth, prepared.plan.depth_across)
             returned = np.maximum(returned, escaping_share(_mean_albedo(prepared, medium, roles), across))
+            caught *= beside_peaks(medium.phase)
         record["background"] = (sky + suns * caught) * returned * alone
         record["camera_rate"] = prepared.plan.camera_rate
         record["transfer"] = -1 if medium.transfers is None else len(layout.ENUMS["TRANSFER"]) * number
@@ -173,6 +174,17 @@ def escaping_share(albedo: np.ndarray, depth: np.ndarray) -> np.ndarray:
     """
     share: np.ndarray = albedo / (albedo + (1.0 - albedo) * (1.0 + np.minimum(depth, 1e9)))
     return share
+
+
+def beside_peaks(phase: records.PhaseFunction) -> float:
+    """What a phase function scatters far from its peak, about, as a share of what an isotropic one does.
+
+    Most rays are far from the peak towards a sun.  At right angles to it, that of Henyey and Greenstein has
+    (1 - g²) / (1 + g²)^1.5; other kinds count as isotropic.
+    """
+    shares = [(weight, lobe.g**2 if lobe.kind == "hg" else 0.0) for lobe, weight in phase_lobes(phase)]
+    total = sum(weight for weight, _ in shares)
+    return float(sum(weight * (1.0 - g2) / (1.0 + g2) ** 1.5 for weight, g2 in shares) / total)
 
 
 def _mean_albedo(prepared: PreparedScene, medium: records.Medium, roles: Mapping[str, int]) -> np.ndarray:

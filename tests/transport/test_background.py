@@ -170,6 +170,24 @@ def test_it_is_less_noisy_where_scattered_light_is_nearly_what_is_behind(albedo,
     assert noise["expected"] < 0.8 * noise["sampled"]
 
 
+@functools.cache
+def thrice_lit(background):
+    """A peaked phase function, far from whose peaks all suns are."""
+    directions = (0.6, -0.8, 0.0), (-0.6, -0.8, 0.0), (0.0, -0.8, 0.6)
+    suns = tuple(DirectionalEmitter((4.0 - n,), way) for n, way in enumerate(directions))
+    described = scene(suns, albedo=0.99, scale=0.2)
+    [shape] = described.shapes
+    shape = replace(shape, interior=replace(shape.interior, phase=Phase("hg", 0.9)))
+    options = {"technique": "delta", "sampler": "independent", "lanes": "16", "background": background}
+    return render(replace(described, shapes=(shape,)), spp=1 << 12, seed=seed_of(background), **options)
+
+
+def test_it_is_less_noisy_where_the_peaks_of_suns_are_elsewhere():
+    """What the other suns bring is not what an isotropic phase function would make of them."""
+    assert thrice_lit("expected").noise < thrice_lit("sampled").noise
+    assert_same_picture(thrice_lit("expected"), thrice_lit("sampled"))
+
+
 def test_what_escapes_of_the_light_in_a_medium_is_known_at_its_limits():
     depth = np.array([0.0, 1.0, np.inf])
     assert media.escaping_share(np.ones(3), depth) == pytest.approx(1.0)
