@@ -48,7 +48,7 @@ INLINE Spectrum sheet_value(const Scene *scene, __global const Material *materia
     const Base base = principled_base(scene, material, uv, channel);
     const bool passes = wo.z < 0.0f;
     const float o = abs_of(wo.z);
-    const float3 m = normalize(wi + (float3)(wo.x, wo.y, o));
+    const float3 m = direction_of(wi + (float3)(wo.x, wo.y, o));
     const float cos_i = dot_of(wi, m), cos_o = dot_of(wo, m);
     const Facets facets = sheet_facets(&sheet, passes);
     const bool meets = cos_i > 0.0f && cos_o * wo.z > 0.0f;

@@ -31,7 +31,7 @@ INLINE Spectrum rough_conductor_value(const Scene *scene, __global const Materia
     if (wi.z <= 0.0f || wo.z <= 0.0f)
         return (Spectrum)(0.0f);
     LOAD_FACETS(scene, material, uv)
-    const float3 m = normalize(wi + wo);
+    const float3 m = direction_of(wi + wo);
     const float density = 0.25f * microfacet_density(FACETS_OF(material), m);
     *pdf = density * visibility_over_cos(FACETS_OF(material), wi);
     const float value = density * shadowing_over_cos(FACETS_OF(material), wi) * shadowing(FACETS_OF(material), wo);

@@ -26,7 +26,7 @@ INLINE Spectrum rough_plastic_value(const Scene *scene, __global const Material 
         return (Spectrum)(0.0f);
     const float in = coat_transmittance(scene, material, wi.z), out = coat_transmittance(scene, material, wo.z);
     LOAD_FACETS(scene, material, uv)
-    const float3 m = normalize(wi + wo);
+    const float3 m = direction_of(wi + wo);
     const float density = 0.25f * microfacet_density(FACETS_OF(material), m);
     const float coat = density * shadowing_over_cos(FACETS_OF(material), wi) * shadowing(FACETS_OF(material), wo) *
                        fresnel_dielectric(dot_of(wi, m), material->ior).reflectance;

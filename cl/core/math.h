@@ -1,6 +1,6 @@
 /* Small arithmetic that must cost what the instruction costs.
 
-   PoCL calls its library for min, max, mix, fma, floor, sqrt, dot, normalize, sin and cos instead of inlining
+   PoCL calls its library for min, max, mix, fma, floor, sqrt, dot, cross, normalize, vload3, sin and cos instead of inlining
    them: a third of all instructions of a render of cloud.xml.  Plain expressions compile to single instructions everywhere.  A
    product and a sum in one expression are contracted to a fused multiply-add where there is one. */
 #ifndef CLVOL_CORE_MATH_H
@@ -37,8 +37,20 @@ INLINE float sqrt_of(float x)
 
 INLINE float dot_of(float3 a, float3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
-/* v of length 1, where v is neither so long nor so short that its square is out of range: normalize() minds that. */
+INLINE float3 cross_of(float3 a, float3 b)
+{
+    return (float3)(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+}
+
+/* v of length 1, where v is neither so long nor so short that its square is out of range. */
 INLINE float3 unit_of(float3 v) { return v * (1.0f / sqrt_of(dot_of(v, v))); }
+
+/* v of length 1, however long or short it is. */
+INLINE float3 direction_of(float3 v)
+{
+    const float square = dot_of(v, v);
+    return square > 1e-30f && square < 1e30f ? v * (1.0f / sqrt_of(square)) : normalize(v);
+}
 
 /* Largest integer not above x, cut to the range of the lattices that use it. */
 INLINE int floor_int(float x)

@@ -99,7 +99,7 @@ INLINE float3 area_point(const Scene *scene, __global const Emitter *emitter, fl
         p = (float3)(turn.x, turn.y, u);
         n = transform_vector(world, (float3)(turn.x, turn.y, 0.0f));
     }
-    n = normalize(n);
+    n = direction_of(n);
     *ng = shape->flip ? -n : n;
     return transform_point(world, p);
 }

@@ -12,7 +12,7 @@
 /* Fractional column (in cells between texel centres, 0..W) and row (0..H-1) of a world direction. */
 INLINE float2 envmap_position(const Scene *scene, float3 direction)
 {
-    const float3 d = normalize(transform_vector(scene->envmap->env_from_world, direction));
+    const float3 d = direction_of(transform_vector(scene->envmap->env_from_world, direction));
     const float width = (float)scene->envmap->size[0], height = (float)scene->envmap->size[1];
     float column = atan2(d.x, -d.z) * (0.5f / PI) * width - 0.5f;
     column -= floor(column / width) * width;
@@ -64,7 +64,7 @@ INLINE float3 envmap_sample(const Scene *scene, float u, float v, float *pdf)
     const float sine = sin(theta);
     *pdf = envmap_cell_pdf(scene, x, y, sine);
     const float3 d = (float3)(sine * sin(phi), cos(theta), -sine * cos(phi));
-    return normalize(transform_vector(scene->envmap->world_from_env, d));
+    return direction_of(transform_vector(scene->envmap->world_from_env, d));
 }
 
 #endif

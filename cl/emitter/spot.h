@@ -13,7 +13,7 @@
 INLINE float spot_falloff(__global const Emitter *emitter, float3 d)
 {
     const float3 axis = (float3)(emitter->vector[0], emitter->vector[1], emitter->vector[2]);
-    const float3 across = cross(axis, d);
+    const float3 across = cross_of(axis, d);
     const float angle = atan2(sqrt_of(dot_of(across, across)), dot_of(axis, d)); /* a cosine is blind near the axis */
     if (angle <= emitter->beam_width)
         return 1.0f;

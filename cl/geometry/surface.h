@@ -46,7 +46,7 @@ INLINE void set_frame(Surface *surface, float3 n, float3 dp_du)
     const float square = dot_of(s, s);
     surface->n = n;
     surface->s = square > 1e-20f * dot_of(dp_du, dp_du) ? s / sqrt_of(square) : to_frame(n, 1.0f, 0.0f, 0.0f);
-    surface->t = cross(n, surface->s);
+    surface->t = cross_of(n, surface->s);
 }
 
 /* The shape that a primitive belongs to. */
@@ -57,7 +57,11 @@ INLINE uint primitive_shape(const Scene *scene, uint primitive)
     return scene->faces[4 * primitive + 3];
 }
 
-INLINE float3 vertex(const Scene *scene, uint number) { return vload3(number, scene->vertices); }
+INLINE float3 vertex(const Scene *scene, uint number)
+{
+    __global const float *v = scene->vertices + 3 * (size_t)number;
+    return (float3)(v[0], v[1], v[2]);
+}
 
 INLINE void triangle_surface(const Scene *scene, const Hit *hit, __global const Shape *shape, Surface *surface)
 {
@@ -66,7 +70,7 @@ INLINE void triangle_surface(const Scene *scene, const Hit *hit, __global const 
     const float u = hit->u, v = hit->v, w = 1.0f - u - v;
     const float3 e1 = b - a, e2 = c - a;
     surface->p = a + u * e1 + v * e2;
-    surface->ng = normalize(cross(e1, e2));
+    surface->ng = direction_of(cross_of(e1, e2));
     surface->span = span_of(surface->ng, a, e1, e2);
     surface->uv = (float2)(u, v);
     float3 dp_du = e1;
@@ -134,7 +138,7 @@ INLINE void quadric_surface(const Scene *scene, Ray ray, const Hit *hit, __globa
         const float turn = atan2(p.y, p.x) * (0.5f / PI);
         const float around = turn < 0.0f ? turn + 1.0f : turn;
         if (shape->kind == SURFACE_SPHERE) {
-            p = normalize(p); /* back on the surface: the ray parameter has lost more than the shape has */
+            p = direction_of(p); /* back on the surface: the ray parameter has lost more than the shape has */
             normal = p;
             surface->uv = (float2)(around, acos(clamp_to(p.z, -1.0f, 1.0f)) * (1.0f / PI));
         } else {
@@ -151,9 +155,9 @@ INLINE void quadric_surface(const Scene *scene, Ray ray, const Hit *hit, __globa
 #endif
     /* normals go by the inverse transpose */
     __global const float *m = shape->local_from_world;
-    float3 n = normalize((float3)(m[0] * normal.x + m[4] * normal.y + m[8] * normal.z,
-                                  m[1] * normal.x + m[5] * normal.y + m[9] * normal.z,
-                                  m[2] * normal.x + m[6] * normal.y + m[10] * normal.z));
+    float3 n = direction_of((float3)(m[0] * normal.x + m[4] * normal.y + m[8] * normal.z,
+                                     m[1] * normal.x + m[5] * normal.y + m[9] * normal.z,
+                                     m[2] * normal.x + m[6] * normal.y + m[10] * normal.z));
     n = shape->flip ? -n : n;
     surface->ng = n;
     __global const float *w = shape->world_from_local;

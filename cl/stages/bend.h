@@ -18,7 +18,7 @@ INLINE float3 bent_normal(const Scene *scene, __global const float *entry, const
     if (entry[1] != 0.0f) {
         const float2 slope = entry[3] * texture_gradient(scene, (int)entry[2], surface->uv);
         const float3 u = to_local(surface, surface->dp_du), v = to_local(surface, surface->dp_dv);
-        const float3 n = cross((float3)(u.x, u.y, slope.x), (float3)(v.x, v.y, slope.y));
+        const float3 n = cross_of((float3)(u.x, u.y, slope.x), (float3)(v.x, v.y, slope.y));
         return dot_of(to_local(surface, surface->ng), n) < 0.0f ? -n : n;
     }
 #endif
@@ -46,7 +46,7 @@ INLINE void bend_surface(const Scene *scene, Surface *surface, Side *side, float
     n = square > 0.0f && square < INFINITY ? n / sqrt_of(square) : (float3)(0.0f, 0.0f, 1.0f);
     const float rest = 1.0f - n.x * n.x;
     const float3 s = rest > 0.0f ? ((float3)(1.0f, 0.0f, 0.0f) - n.x * n) / sqrt_of(rest) : (float3)(0.0f, 1.0f, 0.0f);
-    const float3 t = cross(n, s);
+    const float3 t = cross_of(n, s);
     const float cos2 = n.z * n.z;
     side->alpha2 = entry[5] != 0.0f ? min_of(0.125f * (1.0f - cos2) / max_of(cos2, 1e-20f), 1.0f) : 0.0f;
     const float3 world_s = to_world(surface, on_side(side, s)), world_t = to_world(surface, on_side(side, t));

@@ -40,7 +40,7 @@ INLINE float3 meter_point(const Scene *scene, float x, float y, float3 *n)
     const float3 a = load_vector(face->x), b = load_vector(face->y), c = load_vector(face->z);
     const bool round = face->kind == METER_SPHERE || face->kind == METER_CYLINDER;
     const float3 out = at.x * a + at.y * b;
-    *n = face->kind == METER_SPHERE ? normalize(out + at.z * c) : (round ? normalize(out) : c);
+    *n = face->kind == METER_SPHERE ? direction_of(out + at.z * c) : (round ? direction_of(out) : c);
     *n *= round ? face->side : 1.0f;
     const float3 p = load_vector(face->place) + out + at.z * (round ? c : (float3)(0.0f));
     const float size = largest3(load_vector(face->place)) + largest3(a) + largest3(b) + (round ? largest3(c) : 0.0f);
