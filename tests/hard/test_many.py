@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from stat_tests import largest_z
+from tiers import quick_first
 
 import clvol
 from clvol.lab.combinations import unbiased
@@ -65,7 +66,7 @@ def test_a_path_of_many_scatterings_keeps_its_energy(kind, thickness, scattering
     assert result.stats["energy_lost_to_caps"] == result.stats["walks_exhausted"] == 0
 
 
-@pytest.mark.parametrize("technique", [name for name in unbiased("technique") if name != "delta"])
+@quick_first("technique", [name for name in unbiased("technique") if name != "delta"])
 def test_ten_thousand_scatterings_keep_their_energy_by_any_technique(technique):
     """In a cube of lumps, where these have null collisions, controls and residuals, whose weights are 1."""
     block = Block(LUMPS, (400.0,), np.eye(4))

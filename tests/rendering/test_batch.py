@@ -89,6 +89,7 @@ def test_each_part_has_the_bits_of_its_sensor_alone(scene, sampler):
     assert again.image.tobytes() == result.image.tobytes()
 
 
+@pytest.mark.contract
 def test_shapes_stand_for_the_irradiancemeters_in_them():
     """A plate of the scene, which is seen as well, and one that is only measured."""
     meter = {"type": "irradiancemeter", "film": {"type": "hdrfilm", "width": 2, "height": 1}}

@@ -52,6 +52,7 @@ def test_no_two_pixels_and_no_two_samples_share_their_random_numbers(whole):
     assert (first != second).any()
 
 
+@pytest.mark.contract
 def test_the_launch_geometry_of_a_gpu_does_not_touch_a_bit(whole, monkeypatch):
     """Work-groups of 64 that share a queue, as on a GPU, where a CPU runs groups of one."""
     tune = Plan.tune

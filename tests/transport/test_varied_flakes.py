@@ -149,7 +149,7 @@ def plain_depth(a, b, n=400):
     return density_at(points).mean() * np.linalg.norm(np.subtract(b, a))
 
 
-@pytest.mark.parametrize("varied", [False, True])
+@quick_first("varied", [False, True])
 def test_in_a_mixture_they_leave_the_extinction_as_it_is(varied):
     """As Mitsuba 3.9.1 has it, where a blendphase has an area of 1."""
     share, s = 0.35, flake_matrix(tuple(ONE[0, 0, 0].tolist()))
