@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.scene import records
-from clvol.scene.extents import CLOSED, bounds_of, is_open, openness, shape_bounds
+from clvol.scene.extents import CLOSED, bounds_of, is_piece, openness, shape_bounds
 from clvol.scene.materials import Null
 
 if TYPE_CHECKING:
@@ -45,8 +45,8 @@ class MediumEntry:
 class Boundary:
     """A surface that divides media: the indices of its shapes among the scene's, and entries (-1: none).
 
-    Closed shapes are each a surface of its own; all open ones that divide the same media are one together, as
-    the walls of a room: light that enters by one leaves by another.
+    Closed shapes are each a surface of its own, and so are meshes with holes; all pieces that divide the same
+    media are one together, as the walls of a room: light that enters by one leaves by another.
     """
 
     shapes: tuple[int, ...]
@@ -133,7 +133,7 @@ def _surfaces_of(shapes: Sequence[records.Shape], sides: dict[int, tuple[int, ..
     surfaces: list[list[int]] = []
     sheets: dict[tuple[int, ...], list[int]] = {}
     for index, media in sides.items():
-        if alike[media] > 1 and is_open(shapes[index]):
+        if alike[media] > 1 and is_piece(shapes[index]):
             if media in sheets:
                 sheets[media].append(index)
                 continue

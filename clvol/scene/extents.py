@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
     from clvol.scene import records
 
-CLOSED = 1e-3
-"""Openness of shapes that are closed but for rounding."""
+CLOSED, LEAKY = 1e-3, 0.1
+"""Openness of shapes that are closed but for rounding, and of meshes that only have holes."""
 _CHUNK = 1 << 16
 _area_of: WeakKeyDictionary[records.Shape, tuple[np.ndarray, float]] = WeakKeyDictionary()
 
@@ -57,9 +57,9 @@ def bounds_of(shapes: Iterable[records.Shape]) -> tuple[np.ndarray, np.ndarray]:
     return np.min(lower, axis=0), np.max(upper, axis=0)
 
 
-def is_open(shape: records.Shape) -> bool:
-    """Whether rays may leave it without crossing it."""
-    return shape.kind in ("rectangle", "disk", "cylinder") or openness([shape]) > CLOSED
+def is_piece(shape: records.Shape) -> bool:
+    """Whether it bounds nothing by itself, as a wall; a mesh that has holes does."""
+    return shape.kind in ("rectangle", "disk", "cylinder") or openness([shape]) > LEAKY
 
 
 def openness(shapes: Iterable[records.Shape], turned: Iterable[records.Shape] = ()) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from pictures import box, camera_rays, homogeneous, picture
 from stat_tests import assert_same_picture
+from surface_scenes import icosphere
 
 import clvol
 from clvol import render
@@ -94,6 +95,19 @@ def test_fog_in_a_cup_ends_at_its_rim():
     behind = Shape("rectangle", clvol.translate((0, 0, 3)) @ clvol.rotate((0, 1, 0), 180) @ clvol.scale(9.0))
     shapes = [*cup, replace(behind, bsdf=BLACK, emission=(1.0,))]
     assert_shows(seen(shapes), -1.0, 1.0)
+
+
+def test_meshes_with_holes_still_add_where_they_overlap():
+    """Two balls, each without a triangle that no ray meets: rays pass the one, both, and the other."""
+    balls = [icosphere((0, 0, z), 1.0, FOG, level=3) for z in (-0.4, 0.4)]
+    for n, ball in enumerate(balls):
+        sideways = ball.mesh.vertices[ball.mesh.faces].mean(axis=1)[:, 0].argmax()
+        faces = np.delete(ball.mesh.faces, sideways, axis=0)
+        balls[n] = replace(ball, mesh=replace(ball.mesh, faces=faces))
+        assert 1e-4 < openness([balls[n]]) < 0.01
+    behind = Shape("rectangle", clvol.translate((0, 0, 3)) @ clvol.rotate((0, 1, 0), 180) @ clvol.scale(9.0))
+    scene = seen([*balls, replace(behind, bsdf=BLACK, emission=(1.0,))], eye=(0.0, 0.0, -5.0), fov=1.0)
+    assert_shows(scene, -2.0, 2.0, bias=4e-3)  # polyhedra are a little smaller than balls
 
 
 @pytest.mark.parametrize("mirror", [1.0, -1.0])
