@@ -52,7 +52,9 @@ def render(technique: str = "delta", **medium) -> np.ndarray:
     }
     camera = {"type": "perspective", "fov": 30, "film": film, "to_world": VIEW}
     scene = {"type": "scene", "camera": camera, "sky": {"type": "constant"}, "box": box}
-    return clvol.render(clvol.load_dict(scene), spp=16, seed=2, technique=technique, majorant="global").image
+    # background: "expected" guesses the mean albedo, by the samples that there are
+    options = {"technique": technique, "majorant": "global", "background": "sampled"}
+    return clvol.render(clvol.load_dict(scene), spp=16, seed=2, **options).image
 
 
 def as_array(vectors: bool) -> dict:
