@@ -60,7 +60,7 @@ PICTURES = {
     "passages, hidden": ("passages", {"hide": "true", "depth": 5}, 32, 1024),
     "sky, low sun": ("sky", {}, 48, 2048),
     "sky, small sun": ("sky", {"aperture": 0.5358, "height": 0.8}, 48, 2048),
-    "smoke in a room": (SCENES / "room", {"res": 24}, 192, 4096),
+    "smoke in a room": (SCENES / "room", {"res": 24}, 224, 4096),
     "shafts of light": (SCENES / "shaft", {"width": 32, "height": 24}, 192, 4096),
     "jade": (SCENES / "jade", {"width": 32, "height": 24}, 64, 2048),
     "lamps, hidden": ("lamps", {"hide": "true", "integrator": "volpath"}, 160, 8192),
