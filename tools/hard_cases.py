@@ -52,8 +52,8 @@ each picture to that number. `docs/hard-cases.jsonl` keeps the figures, and on w
 - **Mitsuba {mitsuba}**: what its `volpath` (scalar_rgb) showed of the scene with as many samples, in at most
   {seconds} s. "right" is within chance and {slack:.1%}. – where the scene has what only clvol reads.
 
-`clvol selftest` renders these cases in one way each, with `--quick` some of them. So do `pytest -m contract`
-and `pytest`. `pytest tests/hard -m hard_full` renders them in every way.
+`clvol selftest` renders these cases in one way each, with `--quick` some of them. So do `pytest -m contract`,
+but for two of half a minute each, and `pytest`. `pytest tests/hard -m hard_full` renders them in every way.
 
 What is no mean of a picture has tests of its own:
 

@@ -1,9 +1,9 @@
 """Which shapes are surfaces that rays meet, and what bounds each medium.
 
 A cube or sphere without a surface that only holds a medium is no surface: its medium is a *span* of
-a ray, worked out afresh for every ray.  Every other shape with media is a *boundary*: a path carries one bit
-for each, set while it is inside, and a medium is present as often as boundaries that hold it, less those that
-name it as their exterior, say (METHODS §6).
+a ray, worked out afresh for every ray.  Every other shape with media is a *boundary*, or a piece of one:
+a path carries one bit for each, set while it is inside, and a medium is present as often as boundaries that
+hold it, less those that name it as their exterior, say (METHODS §6).
 """
 
 from __future__ import annotations
@@ -128,20 +128,13 @@ def find_boundaries(scene: records.Scene) -> Boundaries:
 
 
 def _surfaces_of(shapes: Sequence[records.Shape], sides: dict[int, tuple[int, ...]]) -> Iterable[list[int]]:
-    """The shapes that divide media, by the surfaces that they make up."""
+    """The shapes that divide media, by the surfaces that they make up, in the order of their first ones."""
     alike = Counter(sides.values())
-    surfaces: list[list[int]] = []
-    sheets: dict[tuple[int, ...], list[int]] = {}
+    surfaces: dict[object, list[int]] = {}  # of pieces by the media that they divide, else by their number
     for index, media in sides.items():
-        if alike[media] > 1 and is_piece(shapes[index]):
-            if media in sheets:
-                sheets[media].append(index)
-                continue
-            sheets[media] = [index]
-            surfaces.append(sheets[media])
-        else:
-            surfaces.append([index])
-    return surfaces
+        key = media if alike[media] > 1 and is_piece(shapes[index]) else index
+        surfaces.setdefault(key, []).append(index)
+    return surfaces.values()
 
 
 def _is_interval(shape: records.Shape, exteriors: set[int], holders: Counter[int]) -> bool:

@@ -7,7 +7,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from clvol.scene.primitives import mesh_of
+from clvol.scene.primitives import QUADRICS, mesh_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -76,24 +76,27 @@ def _area(shape: records.Shape) -> tuple[np.ndarray, float]:
     """Area vector (3,), the sum of normals times areas, and area of a shape's surface in the world."""
     if shape not in _area_of:
         with np.errstate(over="ignore", invalid="ignore"):  # of what is refused later
-            vector, area = _disk_or_round(shape) if shape.kind in _ROUND else _of_triangles(shape)
+            vector, area = _of_quadric(shape) if shape.kind in QUADRICS else _of_triangles(shape)
         _area_of[shape] = -vector if shape.flip_normals else vector, area
     return _area_of[shape]
 
 
-_ROUND = ("sphere", "cylinder", "disk")
+def quadric_area(shape: records.Shape) -> float:
+    """World area of a sphere, a disk (an ellipse where it is stretched), or a cylinder without its ends."""
+    x, y, z = shape.to_world[:3, :3].T
+    if shape.kind == "sphere":
+        return 4 * np.pi * float(x @ x)
+    if shape.kind == "disk":
+        return np.pi * float(np.linalg.norm(np.cross(x, y)))
+    return 2 * np.pi * float(np.linalg.norm(x) * np.linalg.norm(z))
 
 
-def _disk_or_round(shape: records.Shape) -> tuple[np.ndarray, float]:
-    """Of a disk; of a sphere and an open cylinder, whose area is the mean of their axes'."""
+def _of_quadric(shape: records.Shape) -> tuple[np.ndarray, float]:
+    """Normals of a sphere and of an open cylinder add up to nothing."""
     x, y, z = shape.to_world[:3, :3].T
     across = np.cross(x, y)
-    if shape.kind == "disk":
-        vector = np.pi * np.copysign(1.0, np.dot(across, z)) * across
-        return vector, float(np.linalg.norm(vector))
-    sides = [float(np.linalg.norm(side)) for side in (np.cross(y, z), np.cross(z, x), across)]
-    area = 4 * np.pi * sum(sides) / 3 if shape.kind == "sphere" else np.pi * sum(sides[:2])
-    return np.zeros(3), area
+    front = np.copysign(np.pi, across @ z) if shape.kind == "disk" else 0.0
+    return front * across, quadric_area(shape)
 
 
 def _of_triangles(shape: records.Shape) -> tuple[np.ndarray, float]:

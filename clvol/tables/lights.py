@@ -11,6 +11,7 @@ import numpy as np
 
 from clvol import layout
 from clvol.scene import records
+from clvol.scene.extents import quadric_area
 from clvol.scene.primitives import QUADRICS
 from clvol.tables.affine import rotation_3x4
 from clvol.tables.colours import luminance, mean_luminance, rgb
@@ -153,16 +154,6 @@ def mesh_run(surfaces: Surfaces, number: int, record: np.void) -> tuple[np.ndarr
 def quadric_primitive(surfaces: Surfaces, number: int) -> int:
     """Number of a shape's primitive: quadrics follow all triangles, in the order of their shapes."""
     return len(surfaces.faces) + sum(shape.kind in QUADRICS for shape in surfaces.shapes[:number])
-
-
-def quadric_area(shape: records.Shape) -> float:
-    """World area of a sphere, a disk (an ellipse where it is stretched), or a cylinder without its ends."""
-    x, y, z = shape.to_world[:3, :3].T
-    if shape.kind == "sphere":
-        return 4 * np.pi * float(x @ x)
-    if shape.kind == "disk":
-        return np.pi * float(np.linalg.norm(np.cross(x, y)))
-    return 2 * np.pi * float(np.linalg.norm(x) * np.linalg.norm(z))
 
 
 def spot_solid_angle(cutoff: float, beam: float) -> float:

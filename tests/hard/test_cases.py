@@ -1,4 +1,4 @@
-"""Every hard case shows its number: in one way each by `pytest -m contract`, some of them by `pytest`.
+"""Every hard case shows its number: in one way by `pytest -m contract` and `pytest`, but for LONG ones.
 
 Every case in every way, an hour or two, is `pytest tests/hard -m hard_full`; docs/hard-cases.md has what that
 found.  All cases of a run together raise a false alarm with probability 1e-4, at fixed seeds.
