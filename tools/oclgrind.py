@@ -100,6 +100,7 @@ CASES = {
     "lights and masks": Case("lights and masks", {}, {"majorant": "grid"}),
     "materials": Case("materials", {}),
     "bends": Case("bends", {}, uninitialised=False),
+    "depths": Case("depths", {}, {"aov": ["normal", "albedo"]}, uninitialised=False),
     "colours, delta": Case("colours", {}, {"technique": "delta", "majorant": "grid"}),
     "colours, spectral": Case(
         "colours", {}, {"technique": "spectral", "majorant": "grid", "probability": "max"}

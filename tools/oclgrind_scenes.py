@@ -137,7 +137,7 @@ BENDS = [
 ]
 
 
-def balls(bsdfs: list[dict[str, Any]]) -> clvol.Scene:
+def balls(bsdfs: list[dict[str, Any]], integrator: str = "path") -> clvol.Scene:
     """A wall of balls, one of each BSDF."""
     made = {
         f"ball{n}": {
@@ -148,8 +148,9 @@ def balls(bsdfs: list[dict[str, Any]]) -> clvol.Scene:
         }
         for n, bsdf in enumerate(bsdfs)
     }
-    sky, integrator = {"type": "envmap", "bitmap": PICTURE}, {"type": "path", "max_depth": 6}
-    described = {"type": "scene", "integrator": integrator, "sensor": pinhole(), "sky": sky}
+    limits = {"type": integrator} | ({"max_depth": 6} if integrator == "path" else {})
+    sky = {"type": "envmap", "bitmap": PICTURE}
+    described = {"type": "scene", "integrator": limits, "sensor": pinhole(), "sky": sky}
     return clvol.load_dict(described | made)
 
 
@@ -274,6 +275,7 @@ MADE = {
     "lights and masks": lights_and_masks,
     "materials": lambda: balls(MATERIALS),
     "bends": lambda: balls(BENDS),
+    "depths": lambda: balls(BENDS, "depth"),
     "colours": colours,
     "flames": flames,
     "sunlit": sunlit,

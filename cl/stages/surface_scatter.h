@@ -143,6 +143,9 @@ INLINE bool shade_surface(const Scene *scene, uint slot, const Draws *draws, boo
     scene = &there;
 #endif
     __global const Shape *shape = scene->shapes + surface.shape;
+#if CLVOL_DEPTH_PICTURE /* instead of radiance; from the near plane on, as in Mitsuba */
+    set_path_radiance(scene, slot, (Spectrum)(hit.t));
+#endif
 #if CLVOL_HAS_AREA && CLVOL_HIDE_EMITTERS /* the camera sees through lamps, as in Mitsuba */
     if (shape->emitter >= 0 && path_bounce(scene, slot) == 0)
         return pass_on(scene, slot, ray, &hit, &surface);
@@ -166,6 +169,12 @@ INLINE bool shade_surface(const Scene *scene, uint slot, const Draws *draws, boo
 #endif
 #if CLVOL_BSDF_BENT
     bend_surface(scene, &surface, &side, &wi);
+#endif
+#if CLVOL_DEPTH_PICTURE
+#if CLVOL_FIRST_HIT
+    first_surface(scene, slot, &surface, side.material);
+#endif
+    return false;
 #endif
 #if CLVOL_HAS_PASSABLE
     if (side.material->kind == MATERIAL_NULL)

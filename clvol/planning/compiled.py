@@ -109,6 +109,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_HAS_CONTROLS": int(plan.needs_controls),
         "CLVOL_HAS_RESIDUALS": int(plan.needs_residuals),
         "CLVOL_HAS_MAX_DEPTH": int(f.depth_limited),
+        "CLVOL_DEPTH_PICTURE": int(f.shows_depth),
         "CLVOL_HIDE_EMITTERS": int(f.hide_emitters),
         "CLVOL_HIDE_ENVIRONMENT": int(f.hide_environment and (f.constant or f.envmap)),
         "CLVOL_HAS_BACKDROP": int(f.backdrop),

@@ -93,6 +93,7 @@ class Features:
     parallel_rays: bool = False
     meter: bool = False
     depth_limited: bool = False
+    shows_depth: bool = False
     hide_emitters: bool = False
     hide_environment: bool = False
     backdrop: bool = False

@@ -125,7 +125,7 @@ def _warnings(plan: Decisions, asked: Mapping[str, str]) -> Iterator[str]:
             yield f"{asked_for}{_instead(plan, family, used[family])}"
     if plan.choices.majorant_scale != 1 and used["majorant"] == "none":
         yield f"{option('majorant_scale')} is not used: nothing in this render walks a majorant"
-    if not (features.emitters or features.emission or features.glow):
+    if not (features.emitters or features.emission or features.glow or features.shows_depth):
         yield "the scene has no emitter: its picture is black"
     if features.alpha and plan.opaque:
         yield (

@@ -70,6 +70,7 @@ def find_features(scene: records.Scene, found: Boundaries) -> Features:
         parallel_rays=isinstance(scene.camera, records.Orthographic | records.Meter),
         meter=records.measured_shape(scene.camera) is not None,
         depth_limited=scene.integrator.max_depth >= 0,
+        shows_depth=scene.integrator.shows_depth,
         hide_emitters=scene.integrator.hide_emitters,
         hide_environment=scene.integrator.hide_emitters or scene.film.backdrop is not None,
         backdrop=any(scene.film.backdrop or ()),

@@ -278,7 +278,8 @@ def render_record(prepared: PreparedScene, seed: int) -> np.ndarray:
     record["backdrop"] = rgb(scene.film.backdrop or (0.0,))
     record["sample_border"] = int(scene.film.sample_border)
     everywhere = any(entry.everywhere for entry in prepared.boundaries.entries)
-    reach = reach_of(scene.camera, prepared.radius, everywhere)
+    counts_all = everywhere or scene.integrator.shows_depth  # from the near plane on
+    reach = reach_of(scene.camera, prepared.radius, counts_all)
     rays = camera_rays(scene.camera, scene.film, prepared.centre, reach)
     for field, value in {
         "camera_eye": rays.eye,

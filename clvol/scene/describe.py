@@ -175,7 +175,10 @@ def _scene_lines(scene: records.Scene) -> Iterator[str]:
     yield f"film     {film.width} x {film.height} pixels{crop}, {rfilter} filter, {scene.spp} spp"
     depth = "unlimited" if integrator.max_depth < 0 else str(integrator.max_depth)
     choices = "".join(f", {key} {value}" for key, value in integrator.choices.items())
-    yield f"paths    max_depth {depth}, rr_depth {integrator.rr_depth}{choices}"
+    if integrator.shows_depth:
+        yield "paths    none: the picture is the distance to the first surface"
+    else:
+        yield f"paths    max_depth {depth}, rr_depth {integrator.rr_depth}{choices}"
     for shape in scene.shapes:
         yield f"shape    {_shape(shape)}"
     for emitter in scene.emitters:

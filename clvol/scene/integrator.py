@@ -125,6 +125,13 @@ def other(reader: Reader) -> Chosen:
     return Chosen(limits, this.media, reader.type)
 
 
+def depth(reader: Reader) -> Chosen:
+    """The `depth` plugin: the distance to the first surface on each ray, 0 where there is none."""
+    _technical(reader)
+    reader.ignore(hide_emitters=bool)
+    return Chosen(Integrator(shows_depth=True), True, reader.type)
+
+
 def moment(reader: Reader) -> Chosen:
     """The `moment` plugin: every render measures its variance, so it is the integrator inside."""
     return _inside(reader)

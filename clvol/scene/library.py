@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from typing import TYPE_CHECKING, Any
 
 from clvol.errors import SceneError
 from clvol.scene.faults import Faults, LostError, UnsupportedError
 from clvol.scene.nodes import Node
-from clvol.scene.vocabulary import INSTEAD, LATER, did_you_mean, join_hints, listed
+from clvol.scene.vocabulary import KNOWN, did_you_mean, join_hints, listed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -108,10 +108,9 @@ class Library:
         SceneError
             An unknown type without a tag, or a tag that contradicts the type.
         """
-        by_type = next(
-            (kind for table in (self.plugins, LATER) for kind, types in table.items() if node.type in types),
-            "",
-        )
+        tables: list[Mapping[str, Container[str]]] = [self.plugins, *(table for table, _ in KNOWN)]
+        kinds = [kind for table in tables for kind, types in table.items() if node.type in types]
+        by_type = node.kind if node.kind in kinds else next(iter(kinds), "")
         if node.kind and by_type and node.kind != by_type:
             raise SceneError(f"'{node.type}' is a {by_type}, not a {node.kind}", node.where)
         if not node.kind and not by_type:
@@ -133,8 +132,10 @@ class Library:
         supported = self.plugins.get(kind, {})
         if node.type in supported:
             return
+        every = f"supported: {listed(supported)}"
+        for table, said in KNOWN:
+            if node.type in table.get(kind, {}):
+                what = f"{kind} '{node.type}' is not supported{said}"
+                raise UnsupportedError(what, node.where, table[kind][node.type] or every)
         what, guess = f"unknown {kind} '{node.type}'", did_you_mean(node.type, supported)
-        if node.type in LATER.get(kind, ()):
-            what = f"{kind} '{node.type}' is not supported in this version"
-            guess = f"{INSTEAD[node.type]};" if node.type in INSTEAD else ""
-        raise UnsupportedError(what, node.where, join_hints(guess, f"supported: {listed(supported)}"))
+        raise UnsupportedError(what, node.where, join_hints(guess, every))

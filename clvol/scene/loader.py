@@ -29,6 +29,7 @@ from clvol.scene import (
     volume,
 )
 from clvol.scene.building import build, build_whole
+from clvol.scene.depth_picture import bare
 from clvol.scene.faults import MOST_SKIPPED, EnoughError, Faults, LostError, UnsupportedError
 from clvol.scene.library import Grids, Library, PluginTable
 from clvol.scene.mesh_attributes import mesh_attribute
@@ -48,6 +49,7 @@ PLUGINS: PluginTable = {
         "volpath": integrator.volpath,
         "volpathmis": integrator.volpath,
         "path": integrator.path,
+        "depth": integrator.depth,
         "moment": integrator.moment,
         "aov": integrator.aov,
         **dict.fromkeys(integrator.OTHERS, integrator.other),
@@ -330,7 +332,7 @@ def _build(root: Node, source: str, grids: Grids | None, faults: Faults, plugins
     faults.check()
     if not sensors:
         raise SceneError("the scene has no sensor that is supported", root.where)
-    return Scene(
+    scene = Scene(
         sensor=sensors[0].camera,
         film=sensors[0].film,
         integrator=chosen,
@@ -343,6 +345,7 @@ def _build(root: Node, source: str, grids: Grids | None, faults: Faults, plugins
         approximated=tuple(faults.approximated),
         left_out=tuple(faults.left_out),
     )
+    return bare(scene) if chosen.shows_depth else scene
 
 
 def _records(root: Node, library: Library) -> dict[str, list[tuple[Node, Any]]]:

@@ -339,6 +339,7 @@ class Integrator:
     hide_emitters: bool = False
     choices: dict[str, str] = field(default_factory=dict)
     aovs: tuple[str, ...] = ()  # pictures that are made beside the image, whoever asks
+    shows_depth: bool = False  # the image is the distance to what rays first meet (`depth_picture`)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from clvol.base.arguments import index
 from clvol.errors import OptionError, SceneError, shown
+from clvol.scene.depth_picture import bare_camera
 from clvol.scene.loader import load_sensor
 from clvol.scene.parameters import sensor_with
 from clvol.scene.records import Batch, IrradianceMeter, Meter, Sampler, Sensor
@@ -47,9 +48,8 @@ def seen_by(scene: Scene, sensor: View) -> Scene:
     """
     if isinstance(sensor, Mapping):
         view = _described(scene, sensor)
-        return replace(
-            scene, sensor=view.camera, film=view.film, spp=view.sampler.spp, seed=view.sampler.seed
-        )
+        camera = bare_camera(view.camera, {}) if scene.integrator.shows_depth else view.camera
+        return replace(scene, sensor=camera, film=view.film, spp=view.sampler.spp, seed=view.sampler.seed)
     sensors = all_sensors(scene)
     try:
         number = index(sensor)

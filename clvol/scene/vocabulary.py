@@ -9,27 +9,61 @@ import heapq
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
-from clvol.errors import option, shortened
+from clvol.errors import shortened
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-LATER: dict[str, tuple[str, ...]] = {
-    "integrator": ("depth", "stokes", "volprim_rf_basic", "multichannel", "vrl", "vpl", "ao"),
-    "film": ("specfilm",),
-    "shape": ("sdfgrid", "ellipsoids", "ellipsoidsmesh", "heightfield"),
-    "bsdf": (
-        *("measured", "measured_polarized", "hair"),
-        *("pplastic", "polarizer", "retarder", "circular"),
-    ),
-}
-"""Kind -> plugins known by name and not supported in this version."""
+MESH, GAUSSIANS = "take a mesh of it, as .ply", "take spheres, each with a to_world"
+METAL, COAT = "take principled, or roughconductor", "a coat on diffuse, or principled with clearcoat"
 
-INSTEAD = {
-    "depth": f"the layer {option('aov', 'depth')} of a picture has it",
-    "stokes": "light is not polarized here",
+LATER: dict[str, dict[str, str]] = {
+    "integrator": {
+        "stokes": "light is not polarized here",
+        **dict.fromkeys(("volprim_rf_basic", "multichannel", "vrl", "vpl", "ao"), ""),
+    },
+    "film": {"specfilm": ""},
+    "shape": {"sdfgrid": MESH, "heightfield": MESH, "ellipsoids": GAUSSIANS, "ellipsoidsmesh": GAUSSIANS},
+    "bsdf": {
+        **dict.fromkeys(("measured", "measured_polarized"), METAL),
+        **dict.fromkeys(("hair", "pplastic", "polarizer", "retarder", "circular"), ""),
+    },
 }
-"""Plugins that are not supported, and what to do about that."""
+"""Kind -> plugins known by name and not supported in this version, and what to do about that."""
+
+OLDER: dict[str, dict[str, str]] = {
+    "integrator": {"field": "take depth, or aov with what it shows"},
+    "sensor": {
+        "telecentric": "take orthographic, which has no lens",
+        "perspective_rdist": "take perspective, which does not distort",
+        **dict.fromkeys(("spherical", "fluencemeter"), ""),
+    },
+    "shape": {
+        "hair": "take bsplinecurve, or linearcurve",
+        "deformable": MESH,
+    },
+    "bsdf": {
+        "phong": "take roughplastic, or roughconductor",
+        "ward": "take roughconductor with alpha_u and alpha_v, or principled with anisotropic",
+        "coating": f"take plastic, {COAT}",
+        "roughcoating": f"take roughplastic, {COAT}",
+        "roughdiffuse": "take diffuse",
+        "difftrans": "take principledthin with diff_trans",
+        "hk": "take a thin shape with a medium in it",
+        "irawan": "",
+    },
+    "texture": {
+        "scale": "scale the colour or the picture itself",
+        "gridtexture": "take a bitmap, or checkerboard",
+        **dict.fromkeys(("wireframe", "curvature"), ""),
+    },
+    "emitter": {"collimated": "take a spot of small cutoff_angle, or a small area light"},
+    "phase": dict.fromkeys(("kkay", "microflake"), "take sggx"),
+    "volume": {"hgridvolume": "take one gridvolume, or a sparse file, as .vdb", "volcache": ""},
+}
+"""The same of Mitsuba 0.6 that Mitsuba 3 has not either, beside those that are upgraded."""
+KNOWN = ((LATER, " in this version"), (OLDER, ", and Mitsuba 3 has none"))
+"""Both, and what is said of not being supported."""
 
 VITAL = ("sigma_t", "values", "albedo", "emission", "temperature")
 """Parameters that a plugin is lost with, where they are given and cannot be read: it would be another."""

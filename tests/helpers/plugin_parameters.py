@@ -152,6 +152,7 @@ PARAMETERS = {
     "volpath": ({}, LIMITS | CHOICES),
     "volpathmis": ({}, LIMITS | CHOICES | {"use_spectral_mis": Silent(False)}),
     "path": ({}, LIMITS),
+    "depth": ({}, {"hide_emitters": Silent(True), **TECHNICAL}),
     "moment": INNER,
     "aov": (INNER[0], INNER[1] | {"aovs": Silent("d:depth")}),
     **{name: (INNER[0], INNER[1] | silent(types)) for name, types in WRAPPERS.items()},

@@ -80,6 +80,7 @@ MITSUBAS = {
         "block_size bsdf_samples emitter_samples hide_emitters samples_per_pass shading_samples timeout"
     ),
     "ptracer": "hide_emitters max_depth rr_depth samples_per_pass timeout",
+    "depth": "block_size hide_emitters samples_per_pass timeout",
     "moment": "block_size hide_emitters samples_per_pass timeout",
 }
 REFUSED = {

@@ -357,3 +357,24 @@ def test_mixtures_of_any_number_are_blends_of_two():
             old(ball(mixture("bsdf", weights, a, b)))
     with pytest.raises(clvol.SceneError, match="unknown bsdf 'mixturebsdf'"):
         new(ball(mixture("bsdf", "1, 2", a, b)))
+
+
+def test_plugins_that_mitsuba_3_has_not_either_are_told_at_once_with_what_to_take(tmp_path):
+    parts = ["""<shape type="hair"/>""", '<emitter type="collimated"/>']
+    for name in ("phong", "ward", "coating"):
+        parts.append(f'<shape type="sphere"><bsdf type="{name}"/></shape>')
+    (tmp_path / "old.xml").write_text(f'<scene version="0.6.0">{SENSOR}\n' + "\n".join(parts) + "</scene>")
+    with pytest.raises(clvol.SceneError) as caught:
+        clvol.load_file(tmp_path / "old.xml")
+    lines = [line.strip().removeprefix(f"{tmp_path}/") for line in str(caught.value).splitlines()]
+    beginnings = [
+        "5 faults in the scene:",
+        "old.xml:2: shape 'hair' is not supported, and Mitsuba 3 has none; take bsplinecurve, or linearcurve",
+        "old.xml:3: emitter 'collimated' is not supported, and Mitsuba 3 has none; take a spot of small",
+        "old.xml:4: bsdf 'phong' is not supported, and Mitsuba 3 has none; take roughplastic, or roughcond",
+        "old.xml:5: bsdf 'ward' is not supported, and Mitsuba 3 has none; take roughconductor with alpha_u",
+        "old.xml:6: bsdf 'coating' is not supported, and Mitsuba 3 has none; take plastic, a coat on",
+    ]
+    for line, beginning in zip(lines, beginnings, strict=False):
+        assert line.startswith(beginning)
+    assert "--skip-unsupported" in lines[-1] or "skip_unsupported" in lines[-1]

@@ -426,7 +426,7 @@ def test_a_spheres_center_and_radius_apply_before_to_world():
         ({"type": "cube", "bsdf": {"type": "nul"}}, "unknown plugin 'nul'; did you mean 'null'?"),
         (
             {"type": "sdfgrid", "filename": "a.vol"},
-            "shape 'sdfgrid' is not supported in this version; supported: cube, sph",
+            "shape 'sdfgrid' is not supported in this version; take a mesh of it, as .ply",
         ),
         ({"type": "torus"}, "scene.s: unknown plugin 'torus'"),
         ({"type": "cube", "inside": {"type": "homogeneous"}}, "must be its 'interior' or 'exterior'"),

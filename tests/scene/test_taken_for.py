@@ -74,11 +74,6 @@ def test_aovs_of_a_scene_are_layers_of_its_pictures():
         integrator_of(type="aov", aovs="d:depth,u:uv")
 
 
-def test_a_depth_integrator_is_refused_with_what_to_do():
-    with pytest.raises(clvol.SceneError, match=r"the layer aov=.depth. of a picture has it; supported"):
-        integrator_of(type="depth")
-
-
 def test_integrators_that_see_no_media_are_refused_where_there_are_some():
     medium = {"type": "cube", "bsdf": {"type": "null"}, "interior": {"type": "homogeneous"}}
     for name in ("path", "prb", "direct"):

@@ -51,6 +51,7 @@ PICTURES = {
     "fog": ("fog", {}, 96, 4096),
     "cloud": ("cloud", {}, 24, 1024),
     "batch": ("batch", {}, 32, 1024),
+    "depths": ("depths", {}, 16, 256),
     "bodies": ("bodies", {}, 48, 768),
     "passages": ("passages", {}, 16, 512),
     "passages, depth 1": ("passages", {"depth": 1, "rfilter": "lanczos"}, 32, 4096),
