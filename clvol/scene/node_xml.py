@@ -28,6 +28,8 @@ POINTS = ("position", "center", "p0", "p1", "origin", "target")
 """Parameters of three numbers that Mitsuba has as points; the others are vectors."""
 FACTORS = ("scale", "emission_scale")
 """Parameters that are a number in Mitsuba: a grey colour is written as one."""
+EXTINCTION = "sigma_t"
+"""A colour of media that may be greater than 1: Mitsuba takes such a one as a volume alone."""
 
 
 class Files(Protocol):
@@ -115,7 +117,7 @@ class _Writer:
         """The lines of one parameter."""
         label = f"name={quoted(name)}"
         if isinstance(value, Node):
-            return self._value(name, value) if _is_plain(value) else self.plugin(name, value)
+            return self._value(name, value, owner) if _is_plain(value) else self.plugin(name, value)
         if plain := plain_parameter(name, value, _numbers):
             return [plain]
         array = np.asarray(value)
@@ -129,7 +131,7 @@ class _Writer:
         x, y, z = (_numbers(one) for one in array)
         return [f'<{"point" if name in POINTS else "vector"} {label} x="{x}" y="{y}" z="{z}"/>']
 
-    def _value(self, name: str, value: Node) -> list[str]:
+    def _value(self, name: str, value: Node, owner: Node) -> list[str]:
         """A reference or a colour."""
         if value.type == "ref":
             return [f"<ref{_name(name)} id={quoted(value['id'])}/>"]
@@ -140,7 +142,11 @@ class _Writer:
         if value.type == "rgb":
             if name in FACTORS and len(set(given)) == 1:
                 return [f'<float {label} value="{_numbers(given[:1])}"/>']
-            return [f'<rgb {label} value="{_numbers(given)}"/>']
+            colour = f'<rgb {label} value="{_numbers(given)}"/>'
+            if owner.kind == "medium" and name == EXTINCTION and np.max(given) > 1:
+                inside = colour.replace(label, 'name="value"')
+                return [f'<volume {label} type="constvolume">', f"    {inside}", "</volume>"]
+            return [colour]
         if isinstance(given, Real):
             return [f'<spectrum {label} value="{_numbers(given)}"/>']
         pairs = ", ".join(f"{_numbers(wavelength)}:{_numbers(number)}" for wavelength, number in given)

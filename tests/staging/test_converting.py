@@ -205,6 +205,9 @@ def test_an_old_scene_is_the_same_in_new_words(old: Path, folder: Path) -> None:
     assert not after.approximated  # what was is what is written
     text = output.read_text()
     assert "toWorld" not in text and "bdpt" not in text.split("-->")[1]
+    assert "sigma_s" not in text and "sigma_a" not in text  # which Mitsuba 3 has not, nor colours beyond 1
+    assert '<volume name="sigma_t" type="constvolume">' in text and after.shapes[1].interior.scale == (1.0,)
+    assert after.shapes[1].interior.sigma_t.value == (2.0, 3.0, 4.0)
     assert [file.name for file in (folder / "to").iterdir()] == [
         "new.xml"
     ]  # it names the files that were there

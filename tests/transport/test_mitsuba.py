@@ -228,6 +228,33 @@ def test_a_scene_of_pbrt_is_converted_to_one_that_mitsuba_renders_alike(folder, 
     assert seen < BIAS
 
 
+OLD = """<scene version="0.6.0">
+<integrator type="volpath_simple"> <integer name="maxDepth" value="9"/> </integrator>
+<sensor type="perspective"> <float name="fov" value="40"/>
+  <transform name="toWorld"> <lookAt origin="1, 1.5, -5" target="0, 0, 0" up="0, 1, 0"/> </transform>
+  <film type="ldrfilm"> <integer name="width" value="24"/> <integer name="height" value="16"/>
+    <rfilter type="box"/> </film> </sensor>
+<emitter type="constant"> <spectrum name="radiance" value="0.4, 0.5, 0.7"/> </emitter>
+<emitter type="point"> <point name="position" x="3" y="4" z="-1"/>
+  <spectrum name="intensity" value="20"/> </emitter>
+<medium id="milk" type="homogeneous"> <spectrum name="sigmaS" value="2, 4, 6"/>
+  <spectrum name="sigmaA" value="0.5"/> <float name="scale" value="0.4"/>
+  <phase type="hg"> <float name="g" value="0.3"/> </phase> </medium>
+<shape type="sphere"> <ref name="interior" id="milk"/> </shape>
+<shape type="rectangle"> <transform name="toWorld"> <scale value="3"/> <rotate x="1" angle="-90"/>
+  <translate y="-1.3"/> </transform> <bsdf type="diffuse"/> </shape>
+</scene>"""
+
+
+@pytest.mark.mitsuba
+def test_an_old_scene_is_converted_to_one_that_mitsuba_renders_alike(folder, mitsuba):
+    (folder / "old.xml").write_text(OLD)
+    convert_scene(folder / "old.xml", folder / "renewed.xml", {})
+    found, seen = compare(*both(folder, mitsuba, "renewed", {}, 48, 2048), FALSE_ALARM)
+    assert not found, "; ".join(found)
+    assert seen < BIAS
+
+
 @pytest.mark.mitsuba
 def test_a_picture_that_lacks_its_last_two_bounces_is_noticed(folder, mitsuba):
     theirs, result = both(folder, mitsuba, "passages", {"depth": 5}, 16, 512, {"depth": 3})
