@@ -108,6 +108,7 @@ INLINE SampleKey job_key(const Scene *scene, uint job)
     key.pixel = entry.x;
     key.sample += entry.y;
 #endif
+    key.pixel += render->first_pixel; /* from its number in the band on the device to that in the picture */
     key.bounce = 0;
     return key;
 }

@@ -94,9 +94,14 @@ class Renderer:
         with _opening, staying(job.scene):  # what is worked out of a scene is kept with it, for all devices
             self.job, self._begun = job, False
             device = device or open_device(job.device)
+            pictures = parts_of(job.scene)
             self._sessions = [
-                Session.for_plan(device, one, Plan.of(one, job.choices), job.seed, job.pool, spp=job.spp)
-                for one in parts_of(job.scene)
+                Session.for_plan(
+                    *(device, one, Plan.of(one, job.choices), job.seed, job.pool),
+                    spp=job.spp,
+                    sharing=len(pictures) - n,
+                )
+                for n, one in enumerate(pictures)
             ]
 
     def about(self) -> About:

@@ -180,6 +180,7 @@ ENVMAP = _record(
 
 RENDER = _record(
     ("film_size", "i", 2),
+    ("first_pixel", "u", 1),  # of those on the device, in a film that is rendered in bands
     ("seed", "u", 2),
     ("first_sample", "u", 1),
     ("pass_samples", "u", 1),  # samples per pixel in a full pass

@@ -29,6 +29,7 @@ FAN_IN = 8
 _PER_RUN = frozenset(
     {
         "denoised",
+        "bands",
         "spp",
         "samples",
         "seconds",

@@ -68,8 +68,7 @@ class Saved:
     def put_back(self, session: Session) -> None:
         """Make the session's film what it was; OptionError where it is none of this film."""
         wavefront = session.wavefront
-        sizes = {name: buffer.size for name, buffer in wavefront.film.buffers.items()}
-        if sizes != {name: array.nbytes for name, array in self.buffers.items()}:
+        if wavefront.film.sizes != {name: array.nbytes for name, array in self.buffers.items()}:
             raise OptionError("its film is not that of this render", self.path, _HINT)
         if self.metadata.get("device") != session.device.description:
             log.warning(

@@ -31,14 +31,21 @@ class Film:
     ----------
     seed : low and high word of the seed of its samples.
     pixels : of the picture.
+    held : of them on the device at a time, where these are not all (`clvol.rendering.bands`).
     """
 
-    def __init__(self, device: Device, plan: Plan, pixels: int, seed: tuple[int, int]) -> None:
+    first_pixel = 0
+    """Of those on the device."""
+
+    def __init__(
+        self, device: Device, plan: Plan, pixels: int, seed: tuple[int, int], held: int | None = None
+    ) -> None:
         self.device, self.plan, self.pixels, self.seed = device, plan, pixels, seed
         self.path_counts = layout.path_counts(plan.macros)
         self.firsts = layout.first_hit_fields(plan.macros)
         self.peaks = 1 + layout.shows_weight(plan.macros)
-        sizes = film_sizes(plan, pixels)
+        self.sizes = film_sizes(plan, pixels)
+        sizes = film_sizes(plan, held or pixels)
         what, hint = f"a film of {pixels} pixels", "render fewer pixels"
         self.buffers = {name: device.memory.allocate(size, what, hint) for name, size in sizes.items()}
         if device.memory.shared:
@@ -78,9 +85,7 @@ class Film:
         sums = np.empty((parts, self.pixels, channels))
         for first in range(0, self.pixels, _READ_PIXELS):
             count = min(_READ_PIXELS, self.pixels - first)
-            pairs = np.empty((count, parts, channels, 2), np.float32)
-            at = first * parts * channels * 8
-            cl.enqueue_copy(self.device.queue, pairs, self.buffers["film"], src_offset=at, is_blocking=True)
+            pairs = self._pairs(first, (count, parts, channels, 2))
             np.add(
                 pairs[..., 0].swapaxes(0, 1),
                 pairs[..., 1].swapaxes(0, 1),
@@ -88,6 +93,13 @@ class Film:
                 dtype=np.float64,
             )
         return sums
+
+    def _pairs(self, first: int, shape: tuple[int, ...]) -> np.ndarray:
+        """Value and rounding error of the sums of pixels from `first` on, float32."""
+        pairs: np.ndarray = np.empty(shape, np.float32)
+        at = first * pairs[0].nbytes
+        cl.enqueue_copy(self.device.queue, pairs, self.buffers["film"], src_offset=at, is_blocking=True)
+        return pairs
 
     def estimate(self, first: int, count: int) -> Estimate:
         """What the samples `first` to `first + count`, all rendered, add up to; (pixels, channels)."""

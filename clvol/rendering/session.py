@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import time
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,11 +21,12 @@ from clvol.errors import RenderError, option
 from clvol.planning.in_force import warnings
 from clvol.planning.plan import Plan
 from clvol.planning.settled import Tuning
+from clvol.rendering.bands import BandedWavefront
 from clvol.rendering.light_cache import light_cache_unit
 from clvol.rendering.pool import Pool
 from clvol.rendering.profiler import Profiler, timed
 from clvol.rendering.residence import Residence, compiled
-from clvol.rendering.sizes import check_film, check_volumes, render_bytes
+from clvol.rendering.sizes import brick_bytes, check_volumes, render_bytes, rows_at_a_time
 from clvol.rendering.upload import upload_scene
 from clvol.rendering.wavefront import Wavefront
 from clvol.scene.digest import scene_digest
@@ -89,11 +91,13 @@ class Session:
         spent: float = 0.0,
         profiler: Profiler | None = None,
         spp: int | None = None,
+        sharing: int = 1,
     ) -> Session:
         """Prepare a scene as planned, and open it.
 
         spent : seconds that went into the plan.
         spp : how many samples of a pixel will be asked for; None for any number, and to measure times.
+        sharing : so many sessions that are yet to be opened, this one included, share the device's room.
         """
         check_seed(seed)
         started = time.perf_counter()
@@ -101,7 +105,7 @@ class Session:
             prepared = prepare(scene, plan)
         prepared_after = time.perf_counter() - started
         with driver_errors(device.description):
-            session = cls.open(device, prepared, seed, pool, profiler, spp)
+            session = cls.open(device, prepared, seed, pool, profiler, spp, sharing)
         session.setup_seconds += spent + prepared_after
         return session
 
@@ -114,8 +118,9 @@ class Session:
         pool: int | None = None,
         profiler: Profiler | None = None,
         spp: int | None = None,
+        sharing: int = 1,
     ) -> Session:
-        """Compose and build the kernels, upload the scene, allocate the pool; `spp` as in `for_plan`."""
+        """Compose and build the kernels, upload the scene, allocate the pool; the rest as in `for_plan`."""
         started = time.perf_counter()
         prepared = on_device(prepared, device)
         plan = prepared.plan
@@ -123,17 +128,18 @@ class Session:
             profiler.attach(device, plan)
         record = render_record(prepared, seed)
         slots = Pool.for_device(device, plan, pool)
-        groups, pixels = slots.slots // plan.tuning.group_slots, int(np.prod(record["film_size"]))
+        groups, size = slots.slots // plan.tuning.group_slots, prepared.scene.film.window[2:]
         residence, programs = Residence.of(prepared.scene, device), len(device.programs)
-        check_film(device.memory, plan, prepared.scene.film.window[2:], slots)
-        uploaded_before = residence.uploaded
+        uploaded_before, bricks = residence.uploaded, 0
         if plan.features.volumes and not residence.has("bricks"):
-            check_volumes(device.memory, prepared, render_bytes(plan, pixels, slots))
+            check_volumes(device.memory, prepared, render_bytes(plan, size[0], slots))
+            bricks = brick_bytes(prepared)
+        rows = rows_at_a_time(device.memory, plan, size, slots, sharing, bricks)
         with timed(profiler, "units"):
             grid = light_cache_record(prepared).tobytes() if plan.light_cache else b""
-            key = compiled(plan), groups, pixels, grid
-            stages, others = residence.made("units", key, lambda: _units(prepared, groups, pixels))
-            units = StageUnits.of(device, stages, None if profiler or spp is None else spp * pixels)
+            key = compiled(plan), groups, size[0] * rows, grid
+            stages, others = residence.made("units", key, lambda: _units(prepared, groups, size[0] * rows))
+            units = StageUnits.of(device, stages, None if profiler or spp is None else spp * math.prod(size))
         with SideBuilds(device, [*units.now.values(), *others]) as builds:
             uploading = time.perf_counter()
             with timed(profiler, "upload"):
@@ -144,9 +150,10 @@ class Session:
                 arguments = {name: arguments_of(unit.source) for name, unit in stages.items()}
             built = time.perf_counter()
             with timed(profiler, "pool"):
-                wavefront = Wavefront(
-                    device, plan, kernels, arguments, buffers, record, slots, profiler, units.when_slow
-                )
+                rows = rows_at_a_time(device.memory, plan, size, slots, sharing)  # beside the scene
+                given = device, plan, kernels, arguments, buffers, record, slots, profiler, units.when_slow
+                banded = rows < size[1]
+                wavefront = BandedWavefront(*given, held=size[0] * rows) if banded else Wavefront(*given)
             warming = time.perf_counter()
             with timed(profiler, "first launches"):
                 wavefront.warm_up()
@@ -186,6 +193,12 @@ class Session:
             wavefront.groups,
             wavefront.bytes / 2**20,
         )
+        if wavefront.bands > 1:
+            width, height = self.prepared.scene.film.window[2:]
+            log.info(
+                "film: %d x %d pixels have no room on the device: rendered in %d bands of up to %d rows",
+                *(width, height, wavefront.bands, wavefront.held // width),
+            )
 
     def warn(self, asked: Mapping[str, str]) -> None:
         """Say what a user should hear of; `asked`: names that the caller gave, by family."""
@@ -219,11 +232,14 @@ class Session:
         def spent() -> float:
             return time.perf_counter() - started - apart
 
+        def seconds_left() -> float:
+            return math.inf if time_limit is None else time_limit - spent()
+
         def should_stop() -> int:
             return max(interrupted(), time_limit is not None and spent() >= time_limit)
 
         with driver_errors(self.device.description):
-            for done in self.wavefront.passes(first, count, should_stop):
+            for done in self.wavefront.passes(first, count, should_stop, seconds_left):
                 self.seconds = self.earlier + spent()
                 left = time.perf_counter()
                 yield done

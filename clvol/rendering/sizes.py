@@ -6,11 +6,13 @@ All of a scene's bricks stay on the device: a volume that has no room there is r
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from clvol import layout
-from clvol.base.memory import format_bytes
+from clvol.base.memory import available_memory, format_bytes
 from clvol.base.types import triple
+from clvol.device.memory import KEPT_FREE
 from clvol.errors import DeviceError
 from clvol.layout import BRICK_CELLS, BRICK_SAMPLES
 
@@ -70,46 +72,121 @@ def render_bytes(plan: Plan, pixels: int, pool: Pool) -> int:
     return sum(film.values()) + sum(waves.values())
 
 
-def check_film(memory: DeviceMemory, plan: Plan, size: tuple[int, int], pool: Pool) -> None:
-    """DeviceError where a film of (width, height) pixels has no room, with a size that has."""
-    room = memory.room()
-    need = _film_bytes(memory, plan, math.prod(size), pool)
-    if need <= room and _largest_of_film(plan, math.prod(size)) <= memory.largest:
-        return
-    share = 1.0
+def rows_at_a_time(
+    memory: DeviceMemory, plan: Plan, size: tuple[int, int], pool: Pool, sharing: int = 1, beside: int = 0
+) -> int:
+    """Rows of a film of (width, height) pixels that have room on the device: all, or those of bands alike.
+
+    sharing : so many films, of which this is one, are to have room.
+    beside : bytes that are yet to be put there.
+
+    Raises
+    ------
+    DeviceError
+        Not one row has room, or the host has none for the picture; with a size that has.
+    """
+    room = _Room.of(memory, sharing, beside)
+    rows = room.rows(plan, size, pool)
+    if not rows:
+        raise _without_room(room, plan, size, pool)
+    return rows
+
+
+@dataclass(frozen=True)
+class _Room:
+    """Bytes that a film may take: on the device, and on the host, inf where these are the same."""
+
+    memory: DeviceMemory
+    device: float
+    host: float
+
+    @classmethod
+    def of(cls, memory: DeviceMemory, sharing: int, beside: int) -> _Room:
+        free = None if memory.shared else available_memory()
+        host = math.inf if free is None else free * (1 - KEPT_FREE)
+        return cls(memory, max(memory.room() - beside, 0) / sharing, host / sharing)
+
+    def rows(self, plan: Plan, size: tuple[int, int], pool: Pool) -> int:
+        """Rows at a time, 0 for none."""
+        width, height = size
+        pixels = width * height
+        whole = _film_bytes(self.memory, plan, pixels, pool) <= self.device
+        if whole and max(_buffers(plan, pixels, pool)) <= self.memory.largest:
+            return height
+        kept = _kept_bytes(plan, pixels)
+        if kept > self.host:
+            return 0
+        room = _MARGIN * self.device - (kept if self.memory.shared else 0)
+        low, high = 0, height - 1
+        while low < high:
+            middle = (low + high + 1) // 2
+            fits = _on_device(plan, width * middle, pool) <= room
+            fits = fits and max(_buffers(plan, width * middle, pool)) <= self.memory.largest
+            low, high = (middle, high) if fits else (low, middle - 1)
+        return -(-height // -(-height // low)) if low else 0
+
+
+def _without_room(room: _Room, plan: Plan, size: tuple[int, int], pool: Pool) -> DeviceError:
+    """What is said of a film that cannot be rendered, not in bands either."""
+    memory, pixels, share = room.memory, math.prod(size), 1.0
+    safely = replace(room, device=_MARGIN * room.device)
     while share > _LEAST_SHARE:
         share *= _STEP
         width, height = (max(1, int(n * share)) for n in size)
-        pixels = width * height
-        if _largest_of_film(plan, pixels) > memory.largest:
-            continue
-        if _film_bytes(memory, plan, pixels, pool) <= _MARGIN * room:
+        if safely.rows(plan, (width, height), pool):
             hint = f"{width} x {height} would fit: render fewer pixels, or tiles as crop windows of the film"
             break
     else:
         hint = "render fewer pixels"
-    raise DeviceError(
-        f"a film of {math.prod(size)} pixels needs {format_bytes(need)}; {memory.name} has "
-        f"{format_bytes(room)}, and at most {format_bytes(memory.largest)} in one buffer",
+    if _kept_bytes(plan, pixels) > room.host:
+        need, had = format_bytes(_kept_bytes(plan, pixels)), format_bytes(room.host)
+        what = (
+            f"a film of {pixels} pixels, of which {memory.name} would have some rows at a time, needs {need} "
+        )
+        return DeviceError(f"{what}of this machine's memory, which has {had}", hint=hint)
+    need = format_bytes(_film_bytes(memory, plan, pixels, pool))
+    return DeviceError(
+        f"a film of {pixels} pixels needs {need}; {memory.name} has {format_bytes(room.device)}, and at most "
+        f"{format_bytes(memory.largest)} in one buffer",
         hint=f"{hint}; or use a device with more memory",
     )
+
+
+def _on_device(plan: Plan, pixels: int, pool: Pool) -> int:
+    """That a render takes there beside its scene, with the film of its survey."""
+    survey = sum(film_sizes(plan, pixels).values()) if plan.pixel_list else 0
+    return render_bytes(plan, pixels, pool) + survey
 
 
 def _film_bytes(memory: DeviceMemory, plan: Plan, pixels: int, pool: Pool) -> int:
     """That a film and its paths take at most at a time; making the picture comes from a shared memory too."""
     picture = HOST_BYTES * pixels if memory.shared else 0
-    return max(render_bytes(plan, pixels, pool), sum(film_sizes(plan, pixels).values()) + picture)
+    return max(_on_device(plan, pixels, pool), sum(film_sizes(plan, pixels).values()) + picture)
 
 
-def _largest_of_film(plan: Plan, pixels: int) -> int:
-    return max(film_sizes(plan, pixels).values())
+def _kept_bytes(plan: Plan, pixels: int) -> int:
+    """That the host takes for a film in bands: its sums, and those of a round or to make the picture."""
+    film = sum(film_sizes(plan, pixels).values())
+    return (1 + plan.pixel_list) * film + max(film, HOST_BYTES * pixels)
+
+
+def _buffers(plan: Plan, pixels: int, pool: Pool) -> tuple[int, ...]:
+    """Bytes of each buffer."""
+    _, ring_jobs = pool.ring(pixels * plan.jobs_per_sample)
+    waves = wave_sizes(plan, pixels, pool.slots, ring_jobs)
+    return (*film_sizes(plan, pixels).values(), *waves.values())
+
+
+def brick_bytes(prepared: PreparedScene) -> int:
+    """Of all its volumes."""
+    bricks = sum(volume.bricks.brick_count * volume.bricks.channels for volume in prepared.volumes)
+    return 4 * BRICK_SAMPLES * bricks
 
 
 def check_volumes(memory: DeviceMemory, prepared: PreparedScene, beside: int) -> None:
     """DeviceError where the bricks of a scene's volumes have no room, but so many other bytes do."""
     plural = "volume" if len(prepared.volumes) == 1 else "volumes"
-    need = sum(volume.bricks.brick_count * volume.bricks.channels for volume in prepared.volumes)
-    need *= BRICK_SAMPLES * 4
+    need = brick_bytes(prepared)
     room = min(memory.largest, memory.room() - beside)
     if need <= room or room <= 0:  # where nothing at all has room beside the film, the film's error says so
         return

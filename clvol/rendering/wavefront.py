@@ -9,6 +9,7 @@ are in flight together, so that no slot waits for a pass to end.
 from __future__ import annotations
 
 import logging
+import math
 import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,7 @@ from clvol import layout
 from clvol.device.launch import launch, scene_arguments, set_arguments
 from clvol.rendering.film import Film
 from clvol.rendering.handled import Handled
+from clvol.rendering.patience import Patience
 from clvol.rendering.profiler import timed
 from clvol.rendering.sizes import stride, wave_sizes
 
@@ -38,11 +40,6 @@ _HARVEST_SECONDS = 2.0
 """Statistics of the slots are collected at least this often: their 32-bit counters must not run over."""
 _BATCH_SECONDS = 0.02
 """Waves are launched in batches of about this length; between batches the host reads the counters."""
-_PATIENCE_SECONDS = 10.0
-"""How long paths in flight are waited for once the render is to end: hardly any path takes as long, but some
-never end.  Whole passes that then lack a path are dropped."""
-_FIRST_PATIENCE_SECONDS = 30.0
-"""The same where no pass is finished yet: without one there is no picture."""
 
 
 class Wavefront:
@@ -56,6 +53,7 @@ class Wavefront:
     render : the Render record, without its schedule fields.
     profiler : is told of all that goes to the device.
     when_slow : asked, with the seconds that the stages took, for kernels to go on with in place of these.
+    held : pixels that the device has at a time, where these are not all (`clvol.rendering.bands`).
     """
 
     def __init__(
@@ -69,14 +67,17 @@ class Wavefront:
         pool: Pool,
         profiler: Profiler | None = None,
         when_slow: Callable[[float], dict[str, cl.Kernel]] = lambda seconds: {},
+        held: int | None = None,
     ) -> None:
         self.device, self.plan, self.kernels, self.pool = device, plan, kernels, pool
         self.profiler, self._when_slow = profiler, when_slow
         self._arguments = arguments
         self.render = render
         self.pixels = int(render["film_size"][0, 0]) * int(render["film_size"][0, 1])
+        self.held = held or self.pixels
+        self.bands = -(-self.pixels // self.held)
         self.buffers: dict[str, cl.Buffer] = {}
-        self.list_pixels(None)
+        self._list(self.held)
         self.groups = pool.slots // plan.tuning.group_slots
         self.fields = layout.path_fields(plan.macros)
         low, high = (int(word) for word in render["seed"][0])
@@ -94,7 +95,7 @@ class Wavefront:
         sizes = {
             "render": self.render.nbytes,
             "counters": 4 * (_DONE + self.ring_passes),
-            **wave_sizes(self.plan, self.pixels, self.pool.slots, ring_jobs),
+            **wave_sizes(self.plan, self.held, self.pool.slots, ring_jobs),
         }
         self.buffers = {name: self._buffer(size) for name, size in sizes.items()} | scene_buffers
         self.bytes = sum(sizes.values()) + sum(b.size for b in scene_buffers.values())
@@ -103,7 +104,7 @@ class Wavefront:
         self._write("state", state)
         self._write("counters", np.zeros(_DONE + self.ring_passes, np.uint32))
         self._write("queue_lengths", self.handled.all_idle(self.plan.tuning.group_slots))
-        self.list_pixels(None)
+        self._list(self.held, self._entries(np.arange(self.held)))
 
     def _use(self, kernels: dict[str, cl.Kernel]) -> None:
         """Launch these from now on."""
@@ -157,23 +158,38 @@ class Wavefront:
 
         int (n,), or None for all; a list needs kernels with `plan.pixel_list`.
         """
-        self.listed = self.pixels if pixels is None else len(pixels)
-        self.sample_jobs = self.listed * self.plan.jobs_per_sample  # of one sample of each
+        chosen = np.arange(self.pixels) if pixels is None else pixels
+        self._list(len(chosen), self._entries(chosen))
+
+    def _entries(self, pixels: np.ndarray) -> np.ndarray | None:
+        """What a list says of pixels: their numbers, and the samples they have; None without lists."""
+        if not self.plan.pixel_list:
+            return None
+        return np.stack([pixels, self.film.samples[pixels]], axis=1).astype(np.uint32)
+
+    def _list(self, listed: int, entries: np.ndarray | None = None) -> None:
+        """Let so many pixels be rendered: all on the device, or those of a list's entries."""
+        self.listed = listed
+        self.sample_jobs = listed * self.plan.jobs_per_sample  # of one sample of each
         self.pass_samples = max(1, self.pool.pass_jobs // self.sample_jobs)
-        if self.plan.pixel_list and self.buffers:
-            chosen = np.arange(self.pixels) if pixels is None else pixels
-            entries = np.stack([chosen, self.film.samples[chosen]], axis=1).astype(np.uint32)
+        if entries is not None:
             self._write("pixel_list", entries)
 
-    def passes(self, first: int, count: int, should_stop: Callable[[], int]) -> Iterator[int]:
+    def passes(
+        self,
+        first: int,
+        count: int,
+        should_stop: Callable[[], int],
+        seconds_left: Callable[[], float] = lambda: math.inf,
+    ) -> Iterator[int]:
         """Render samples `first` .. `first + count` of every pixel listed; how many, whenever it is more.
 
         `should_stop` is asked between batches.  Once it says 1 no new pass is begun, and the passes in
         flight are finished, not dropped (dropping favours short paths), as long as patience lasts; at 2 only
         what is finished is kept, with a warning, and at 3 without.  So it is where the iterator is closed.
+        `seconds_left` is for passes that are long enough to be planned.
         """
-        done = 0
-        self._stopping_since: float | None = None
+        done, self._patience = 0, Patience()
         per_round = max(1, _MAX_ROUND_JOBS // (self.pass_samples * self.sample_jobs)) * self.pass_samples
         while done < count and not (done and should_stop()):
             part, finished = min(count - done, per_round), 0
@@ -219,7 +235,7 @@ class Wavefront:
                 idle = finished == passes or bool(finished == begun and begun and should_stop())
                 if idle:
                     return
-                if self._out_of_patience(urgency, finished > 0 or earlier):
+                if self._patience.ends(urgency, finished > 0 or earlier):
                     if urgency <= 2:
                         log.warning("dropped %d unfinished passes, whose paths did not end", begun - finished)
                     return
@@ -227,16 +243,6 @@ class Wavefront:
             if not idle:
                 with suppress(cl.Error):  # a device that is lost has no paths
                     self._abandon()
-
-    def _out_of_patience(self, urgency: int, some_finished: bool) -> bool:
-        """Whether paths in flight are no longer waited for."""
-        if urgency == 0:
-            return False
-        now = time.perf_counter()
-        if self._stopping_since is None:
-            self._stopping_since = now
-        patience = _PATIENCE_SECONDS if some_finished else _FIRST_PATIENCE_SECONDS
-        return urgency > 1 or now - self._stopping_since > patience
 
     def _abandon(self) -> None:
         """Give up the paths in flight, and with them the passes that they belong to."""
@@ -257,7 +263,7 @@ class Wavefront:
         self._reset_clocks()
 
     def _start_round(self, first: int, pass_jobs: int, last_pass: int, last_samples: int) -> None:
-        self.render["seed"] = self.film.seed
+        self.render["seed"], self.render["first_pixel"] = self.film.seed, self.film.first_pixel
         self.render["first_sample"], self.render["pass_samples"] = first, self.pass_samples
         self.render["pass_jobs"], self.render["ring_passes"] = pass_jobs, self.ring_passes
         self.render["last_pass"], self.render["last_samples"] = last_pass, last_samples

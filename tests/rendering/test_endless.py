@@ -17,7 +17,7 @@ from tiers import quick_first
 import clvol
 from clvol.planning.choices import Choices
 from clvol.planning.lanes import lanes
-from clvol.rendering import wavefront
+from clvol.rendering import patience
 from clvol.rendering.outcome import make_result
 from clvol.rendering.session import Session
 
@@ -121,8 +121,8 @@ def test_a_second_interrupt_keeps_finished_passes_and_leaves_nothing_behind(devi
 
 
 def test_a_time_limit_ends_paths_without_end(monkeypatch):
-    for name in ("_PATIENCE_SECONDS", "_FIRST_PATIENCE_SECONDS"):
-        monkeypatch.setattr(wavefront, name, 0.01)
+    for name in ("PATIENCE_SECONDS", "FIRST_PATIENCE_SECONDS"):
+        monkeypatch.setattr(patience, name, 0.01)
     with pytest.raises(clvol.RenderError, match="go on for very long"):
         clvol.render(endless("majorant"), time_limit=0.01, majorant_scale=3e7)
 
