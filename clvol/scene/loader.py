@@ -34,7 +34,7 @@ from clvol.scene.faults import MOST_SKIPPED, EnoughError, Faults, LostError, Uns
 from clvol.scene.library import Grids, Library, PluginTable
 from clvol.scene.mesh_attributes import mesh_attribute
 from clvol.scene.mesh_files import FORMATS
-from clvol.scene.nodes import Node, from_dict
+from clvol.scene.nodes import NAMELESS, Node, from_dict
 from clvol.scene.pbrt.translation import is_pbrt, read_pbrt
 from clvol.scene.records import ConstantEmitter, EnvmapEmitter, Integrator, Scene, Sensor, Shape
 from clvol.scene.spectrum_plugins import SPECTRA
@@ -408,18 +408,22 @@ def _is_inside(node: Node, record: object, library: Library) -> bool:
 
 
 def _check_used(records: Mapping[str, list[tuple[Node, object]]], library: Library) -> None:
-    """What stands in the scene to be referred to must have an id, and should have a ref to it."""
+    """What stands in the scene to be referred to must have an id, and should have a ref to it.
+
+    One with a name alone, which has no meaning there, is from a program that writes what a dict had.
+    """
     pairs = [pair for kind in records if kind not in IN_SCENES for pair in records[kind]]
     idle = [node for node, _ in pairs if id(node) not in library.taken]
+    names = {id(node): name for name, node in library.root.parameters() if not name.startswith(NAMELESS)}
     for node in idle:
-        if not node.id:
+        if not node.id and id(node) not in names:
             raise SceneError(
                 f"the {library.kind_of(node)} '{node.type}' stands in the scene and belongs to nothing",
                 node.where,
                 "put it into the plugin that it is for, or give it an id and refer to it",
             )
     if idle:
-        some = listed([f"'{node.id}'" for node in idle], 5)
+        some = listed([f"'{node.id or names[id(node)]}'" for node in idle], 5)
         log.warning("defined in the scene and not used: %s", some)
 
 

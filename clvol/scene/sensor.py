@@ -96,10 +96,8 @@ def distant(reader: Reader) -> Sensor:
     if shapes:
         target = reader.build(shapes[0][1])
         if not isinstance(target, Shape):
-            kind = shapes[0][1].type
-            reader.unsupported(
-                f"a {kind} as the target of a distant sensor", "target", "take one shape of it"
-            )
+            what = f"the target of a distant sensor must be one shape, not a '{shapes[0][1].type}'"
+            reader.unsupported(what, "target", "take one shape of it, as Mitsuba does")
         if target.kind == "cylinder" and not stays_round(target.to_world):
             reader.fail("a cylinder that is a target must not be stretched across or sheared", "target")
     elif reader.has("target"):

@@ -169,7 +169,7 @@ def test_they_are_described_and_have_parameters():
         (distant(direction=[0, 0, 0]), "direction is zero"),
         (
             distant(target={"type": "merge", "a": {"type": "cube"}}),
-            "a merge as the target of a distant sensor",
+            "must be one shape, not a 'merge'",
         ),
         (
             distant(target={"type": "cylinder", "to_world": clvol.scale([1, 2, 1])}),

@@ -95,6 +95,12 @@ def test_a_part_with_an_id_that_nothing_refers_to_is_warned_of(load, caplog):
     assert "defined in the scene and not used: 'a', 'n0', 'n1', 'n2', 'n3' and 5 more" in caplog.text
 
 
+def test_a_part_with_a_name_alone_as_mitsuba_writes_those_of_dicts_is_warned_of(load, caplog):
+    with caplog.at_level(logging.WARNING, logger="clvol"):
+        load('<texture type="checkerboard" name="paint"/><shape type="cube"/>')
+    assert "defined in the scene and not used: 'paint'" in caplog.text
+
+
 def test_misnamed_volumes_are_not_said_to_be_unwelcome(load):
     volume = '<medium type="heterogeneous" id="m"><volume name="sigmat" type="constvolume"/></medium>'
     assert "unknown parameter 'sigmat' of medium 'heterogeneous'; did you mean 'sigma_t'?" in error_of(
