@@ -5,6 +5,7 @@ All of a scene's bricks stay on the device: a volume that has no room there is r
 
 from __future__ import annotations
 
+import gc
 import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -87,6 +88,10 @@ def rows_at_a_time(
     """
     room = _Room.of(memory, sharing, beside)
     rows = room.rows(plan, size, pool)
+    if rows < size[1]:
+        gc.collect()  # buffers of a render before may be held by nothing but a cycle
+        room = _Room.of(memory, sharing, beside)
+        rows = room.rows(plan, size, pool)
     if not rows:
         raise _without_room(room, plan, size, pool)
     return rows

@@ -14,6 +14,7 @@ from signals import press_key
 
 import clvol
 from clvol.cluster import job, link, on_worker
+from clvol.rendering import session
 from clvol.scene.records import Batch
 
 OPTIONS = {"spp": 40, "seed": 3, "sampler": "joint", "aov": ["depth", "largest_weight"]}
@@ -44,6 +45,13 @@ def test_workers_share_a_picture_and_its_bits_are_those_of_one_device(client, ex
     assert seen[-1].noise == result.noise and result.metadata["seconds"] > 0
     further = clvol.render(scene(), client=client, resume=result, **OPTIONS | {"spp": 44})
     assert further.ranges == ((0, 44),)
+
+
+def test_a_film_larger_than_a_workers_device_is_rendered_in_bands(client, expected, monkeypatch):
+    monkeypatch.setattr(session, "rows_at_a_time", lambda memory, plan, size, *_: 3)
+    result = clvol.render(scene(), client=client, **OPTIONS)
+    assert_same(result, expected)
+    assert result.metadata["bands"] == 3 and "bands" not in expected.metadata
 
 
 def test_sensors_side_by_side_are_in_each_range(client):

@@ -1,5 +1,6 @@
 """Films that have no room on their device are rendered in bands, with the bits of one that has room."""
 
+import gc
 import logging
 import re
 import signal
@@ -146,6 +147,26 @@ def test_a_target_error_surveys_and_fills_all_bands(held, sampler):
     assert parts.estimate.counts.tobytes() == whole.estimate.counts.tobytes()
 
 
+def test_lists_of_pixels_in_any_order_leave_the_same_film(device, held):
+    """Twice, of which the second leaves bands out."""
+    random = np.random.default_rng(1)
+    lists = random.permutation(80)[:50], random.permutation(30)[:9] + 50
+    films = []
+    for rows in (8, 2):
+        held(rows)
+        choices = Choices.for_scene(scene(), {}, target_error=0.1)
+        wavefront = Session.for_scene(device, scene(), choices, seed=4).wavefront
+        for pixels in lists:
+            wavefront.list_pixels(pixels)
+            *_, done = wavefront.passes(0, 5, lambda: 0)
+            wavefront.film.samples[pixels] += done
+        films.append(wavefront.film.contents())
+        assert wavefront.film.samples.max() == 10
+    for name, whole in films[0].items():
+        assert whole.tobytes() == films[1][name].tobytes(), name
+    assert films[0]["film"].any()
+
+
 def test_pictures_and_checkpoints_go_on_from_one_to_the_other(held, tmp_path):
     """And they merge: bands are how a picture was made, not what it is."""
     options = {"seed": 5, "aov": ("depth",)}
@@ -269,6 +290,31 @@ def test_an_urgent_end_leaves_out_the_round_under_way(device, held, level, caplo
     assert_same(shown(bands_, 8), clvol.render(scene(), spp=8, seed=4))
 
 
+def test_what_is_counted_in_a_round_that_is_left_out_does_not_count(device, held):
+    held(2)
+    bands_ = opened(device)
+    assert bands_.run(0, 3) == 3
+    wavefront = bands_.wavefront
+    wavefront._set_counter(bands._NON_FINITE, 5)  # as if there had been some
+    before = wavefront.slot_statistics(), wavefront.non_finite()
+    asked = []
+
+    def urgency():
+        asked.append(0)
+        if len(asked) == 3:
+            wavefront._set_counter(bands._NON_FINITE, 9)
+        return 3 * (len(asked) > 3)
+
+    with pytest.raises(KeyboardInterrupt):
+        bands_.run(3, 9, None, urgency)
+    assert not wavefront.film._fresh, "bands of the round are not kept with those of another"
+    assert (wavefront.slot_statistics(), wavefront.non_finite()) == before
+    assert before[0]["shadow_rays"] > 0 and before[1] == 5
+    assert bands_.run(3, 9) == 9
+    assert wavefront.slot_statistics()["shadow_rays"] > before[0]["shadow_rays"]
+    assert wavefront.non_finite() == 5
+
+
 def test_a_first_round_that_does_not_end_is_no_picture(device, held, monkeypatch):
     held(2)
     monkeypatch.setattr("clvol.rendering.patience.FIRST_PATIENCE_SECONDS", -1.0)
@@ -341,6 +387,7 @@ def test_a_film_beyond_the_largest_buffer_is_rendered_in_bands(device, monkeypat
 
 def limit(monkeypatch, memory, room, shared, host=1 << 40):
     """Let a device have so many bytes beside what tests hold, and the host so many."""
+    gc.collect()
     taken = memory.taken
     monkeypatch.setattr(memory, "shared", shared)
     monkeypatch.setattr(memory, "room", lambda: room - (memory.taken - taken))
@@ -371,6 +418,23 @@ def test_sensors_side_by_side_share_the_room(device, monkeypatch):
     parts = clvol.render(beside, **options)
     assert_same(parts, whole)
     assert "bands" in parts.metadata
+
+
+def test_a_render_that_only_a_cycle_holds_takes_no_room(device, monkeypatch):
+    seen = scene((64, 60))
+    whole = clvol.render(seen, spp=1, seed=1, pool=256)
+    gc.collect()
+    before = opened(device, pool=256)
+    limit(monkeypatch, device.memory, before.wavefront.bytes + 64 * 60 * 96, shared=False)
+    gc.disable()
+    try:
+        cycle = [Session.for_scene(device, seen, Choices.for_scene(seen, {}), seed=4, pool=256)]
+        cycle.append(cycle)
+        del cycle
+        assert_same(again := clvol.render(seen, spp=1, seed=1, pool=256), whole)
+    finally:
+        gc.enable()
+    assert "bands" not in again.metadata
 
 
 def test_a_film_of_which_no_row_has_room_is_refused_with_what_has(device, monkeypatch):

@@ -4,6 +4,7 @@ What grows with a volume is its samples, the bricks on the device (9³ samples f
 PoCL, its compiler and Python's packages take some 250 MiB beside.
 """
 
+import gc
 import re
 import tracemalloc
 
@@ -113,6 +114,7 @@ def film_scene(width, height):
 
 def test_a_film_of_four_times_the_devices_memory_is_refused_with_what_would_fit(device, monkeypatch):
     """Before anything is allocated or built; and what is said to fit does."""
+    gc.collect()
     memory, taken = device.memory, device.memory.taken
     slots = Session.for_scene(
         device, clvol.load_dict(film_scene(4, 4)), Choices(), 1, pool=256
