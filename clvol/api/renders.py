@@ -148,7 +148,9 @@ def render(  # type: ignore[misc]  # the options of several views are those of o
     Result, or a list of them where `sensor` is a list
         The picture and what is known of it. Ctrl-C finishes the paths in flight and returns the picture so
         far, with ``stats["interrupted"]`` set. A second Ctrl-C does not wait for them and keeps the samples
-        that every pixel has. A third raises KeyboardInterrupt.
+        that every pixel has. A third raises KeyboardInterrupt. A film that has no room on the device is
+        rendered in bands of rows, to the same bits: ``metadata["bands"]`` says how many there were, and a
+        pass is a round over all of them.
 
     Raises
     ------
