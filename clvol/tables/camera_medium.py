@@ -39,8 +39,7 @@ def check_camera_medium(scene: records.Scene, found: Boundaries) -> None:
         raise SceneError(
             f"the sensor names medium{_quoted(named)}, and is not inside of the shapes that hold it",
             scene.source,
-            "move the camera into one of them, turn those that face away (flip_normals), or take the medium from "
-            "the sensor",
+            "move the camera into one, turn those that face away (flip_normals), or drop the sensor's medium",
         )
 
 
