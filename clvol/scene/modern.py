@@ -7,6 +7,7 @@ import numpy as np
 from clvol.scene.integrator import BEFORE, WRAPPERS
 from clvol.scene.nodes import Node
 from clvol.scene.sensor import OTHER_SAMPLERS, SAMPLERS_BEFORE
+from clvol.scene.spectra import sampled_to_rgb
 
 
 def modernise(node: Node) -> None:
@@ -22,7 +23,7 @@ def modernise(node: Node) -> None:
 
 
 def _add_up(medium: Node) -> None:
-    """`sigma_t` and `albedo` in place of `sigma_s` and `sigma_a`, of the same bits; spectra by pairs stay."""
+    """`sigma_t` and `albedo` in place of `sigma_s` and `sigma_a`, of the same bits; spectra in files stay."""
     scattered, absorbed = (_colour(medium[name]) for name in ("sigma_s", "sigma_a"))
     if scattered is None or absorbed is None:
         return
@@ -38,13 +39,13 @@ def _add_up(medium: Node) -> None:
 
 
 def _colour(value: object) -> np.ndarray | None:
-    """Numbers that are no spectrum by wavelengths."""
+    """A number or three, as the reader has them; None of what is not in the scene's text."""
     if isinstance(value, Node):
         value = value.get("value") if value.is_value else None
     if value is None:
         return None
     numbers = np.atleast_1d(np.asarray(value, np.float64))
-    return numbers if numbers.ndim == 1 else None
+    return numbers if numbers.ndim == 1 else sampled_to_rgb(numbers[:, 0], numbers[:, 1], False)
 
 
 def _modern(node: Node) -> Node:

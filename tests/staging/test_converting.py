@@ -213,6 +213,21 @@ def test_an_old_scene_is_the_same_in_new_words(old: Path, folder: Path) -> None:
     ]  # it names the files that were there
 
 
+@pytest.mark.parametrize(
+    "parts",
+    [("1", "0.5"), ("1, 2, 3", "1"), ("400:1, 700:2", "0.5, 1, 2"), ("0", "0"), ("0.5, 0, 0", "0, 0, 0.25")],
+)
+def test_scattering_and_absorption_of_any_kind_are_added_up(folder: Path, parts: tuple[str, str]) -> None:
+    given = '<spectrum name="sigmaS" value="{}"/><spectrum name="sigmaA" value="{}"/>'.format(*parts)
+    medium = f'<medium name="interior" type="homogeneous">{given}</medium>'
+    text = f'<scene version="0.6.0">{SENSOR}<shape type="sphere">{medium}</shape></scene>'
+    source, output = folder / "from" / "kinds.xml", folder / "to" / "kinds.xml"
+    source.write_text(text.replace('<sensor version="0.6.0"', "<sensor"))
+    convert_scene(source, output, {})
+    assert same(clvol.load_file(source), clvol.load_file(output))
+    assert "sigma_s" not in output.read_text()
+
+
 def test_a_scene_of_version_3_is_one_already(old: Path, folder: Path) -> None:
     first, second = folder / "to" / "new.xml", folder / "to" / "newer.xml"
     assert run("scene", old, "-o", first, "--quiet").output == ""
