@@ -2,6 +2,7 @@
 #ifndef CLVOL_PATH_RAY_H
 #define CLVOL_PATH_RAY_H
 #include "core/scene.h"
+#include "path/camera.h"
 
 INLINE Ray path_ray(const Scene *scene, uint slot)
 {
@@ -19,7 +20,7 @@ INLINE float ray_limit(const Scene *scene, uint slot, Ray ray)
 #if CLVOL_HAS_METER
     return INFINITY;
 #else
-    return scene->render->camera_far / dot_of(ray.d, load_vector(scene->render->camera_forward));
+    return camera_reach(scene, ray.d);
 #endif
 }
 

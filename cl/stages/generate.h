@@ -1,6 +1,7 @@
 /* Writes a finished path's result at its job's own index and starts the next job in its slot. */
 #ifndef CLVOL_STAGES_GENERATE_H
 #define CLVOL_STAGES_GENERATE_H
+#include "path/camera.h"
 #include "path/draws.h"
 #include "path/reset.h"
 #if CLVOL_HAS_METER
@@ -31,67 +32,6 @@ INLINE void write_result(const Scene *scene, uint slot, uint job)
     write_first_hit(scene, slot, place);
     atomic_inc(scene->counters + COUNTER_DONE + place / scene->render->pass_jobs);
 }
-
-/* Offset of the sample from the pixel's corner along one axis, drawn from the pixel filter's magnitude; a filter
-   that reaches over the window's edge is cut there and renormalised.  A filter f with negative parts multiplies
-   `weight` by sign(f) times the integral of |f| over that of f. */
-INLINE float filter_offset(const Scene *scene, uint k, int pixel, int pixels, float *weight)
-{
-#if CLVOL_HAS_FILTER_TABLE
-    __global const float *cdf = scene->filter_cdf;
-    const int bins = scene->render->filter_bins;
-    const float radius = scene->render->filter_radius;
-    const float per_unit = (float)bins / (2.0f * radius);
-    float lower = 0.0f, upper = 1.0f;
-    float net = CLVOL_HAS_SIGNED_FILTER ? cdf[2 * bins + 1] : 1.0f; /* integral of the filter itself */
-    if (!scene->render->sample_border) {
-        const float from = clamp_to((radius - 0.5f - (float)pixel) * per_unit, 0.0f, (float)bins);
-        const float to = clamp_to((radius - 0.5f + (float)(pixels - pixel)) * per_unit, 0.0f, (float)bins);
-        const int a = min_int((int)from, bins - 1), b = min_int((int)to, bins - 1);
-        lower = lerp(cdf[a], cdf[a + 1], from - (float)a);
-        upper = lerp(cdf[b], cdf[b + 1], to - (float)b);
-        if (CLVOL_HAS_SIGNED_FILTER) {
-            __global const float *sums = cdf + bins + 1;
-            net = lerp(sums[b], sums[b + 1], to - (float)b) - lerp(sums[a], sums[a + 1], from - (float)a);
-        }
-    }
-    const float u = min_of(lerp(lower, upper, uniform_below_one(k)), 0x1.fffffep-1f); /* below the last bin's end */
-    int first = 0, last = bins - 1;
-    while (first < last) {
-        const int middle = (first + last) >> 1;
-        if (cdf[middle + 1] > u)
-            last = middle;
-        else
-            first = middle + 1;
-    }
-    if (CLVOL_HAS_SIGNED_FILTER)
-        *weight *= with_sign((upper - lower) / net, cdf[bins + 2 + first] - cdf[bins + 1 + first]);
-    const float in_bin = (u - cdf[first]) / (cdf[first + 1] - cdf[first]);
-    return 0.5f - radius + ((float)first + in_bin) / per_unit;
-#else
-    return uniform_float(k);
-#endif
-}
-
-#if !CLVOL_HAS_METER
-/* Starts the camera ray of film position (x, y); u and v place it on the lens, uniformly over its disk. */
-INLINE void set_camera_ray(const Scene *scene, uint slot, float x, float y, float u, float v)
-{
-    __global const Render *render = scene->render;
-    float3 origin = load_vector(render->camera_position) + x * load_vector(render->camera_dx) +
-                    y * load_vector(render->camera_dy);
-    float3 towards = load_vector(render->camera_base) + x * load_vector(render->camera_base_dx) +
-                     y * load_vector(render->camera_base_dy);
-    if (CLVOL_HAS_LENS) {
-        const float2 place = sqrt_of(u) * cos_sin_turn(v);
-        const float3 lens = place.x * load_vector(render->lens_x) + place.y * load_vector(render->lens_y);
-        origin += render->lens_start * lens;
-        towards -= render->lens_bend * lens;
-    }
-    set_path_origin(scene, slot, origin);
-    set_path_direction(scene, slot, unit_of(towards));
-}
-#endif
 
 /* Which numbers the path of a job reads. */
 INLINE SampleKey job_key(const Scene *scene, uint job)
@@ -126,7 +66,9 @@ INLINE void start_job(const Scene *scene, uint slot, uint job, const Draws *draw
 #else
     const float x = (float)px + filter_offset(scene, k.x, px, width, &weight);
     const float y = (float)py + filter_offset(scene, k.y, py, scene->render->film_size[1], &weight);
-    set_camera_ray(scene, slot, x, y, uniform_float(k.z), uniform_float(k.w));
+    const Ray ray = camera_ray(scene, x, y, uniform_float(k.z), uniform_float(k.w));
+    set_path_origin(scene, slot, ray.o);
+    set_path_direction(scene, slot, ray.d);
 #endif
     set_path_sample_weight(scene, slot, weight);
     set_path_channel(scene, slot, job % CLVOL_JOBS_PER_SAMPLE);

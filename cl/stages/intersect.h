@@ -9,6 +9,9 @@
 #if CLVOL_HAS_SEGMENTS
 #include "stages/media.h"
 #endif
+#if CLVOL_LAMP_EDGES
+#include "stages/lamp_edges.h"
+#endif
 #include "path/ray.h"
 #include "path/transitions.h"
 
@@ -38,6 +41,9 @@ INLINE bool intersect_surfaces(const Scene *scene, uint slot, Ray ray)
 INLINE void intersect(const Scene *scene, uint group, uint slot)
 {
     const Ray ray = path_ray(scene, slot);
+#if CLVOL_LAMP_EDGES
+    refine_lamp_edge(scene, slot, ray);
+#endif
     uint event = EVENT_ESCAPE;
 #if CLVOL_HAS_SURFACES
     if (intersect_surfaces(scene, slot, ray))

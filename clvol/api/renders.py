@@ -59,6 +59,7 @@ def render(  # type: ignore[misc]  # the options of several views are those of o
     shadow_cache: str = "auto",
     light_choice: str = "auto",
     next_event: str = "auto",
+    lamp_edges: str = "auto",
     lanes: str = "auto",
     majorant_scale: float = 1.0,
     step: float | None = None,
@@ -99,7 +100,7 @@ def render(  # type: ignore[misc]  # the options of several views are those of o
         technique, transmittance and majorant, where they are left at "auto". ``result.metadata["repeat"]``
         says what it chose. Background "transparent" leaves out the environment behind all there is, which
         still lights it: ``result.alpha`` says how much of a pixel is covered.
-    sampler, shadow_cache, light_choice, next_event, lanes
+    sampler, shadow_cache, light_choice, next_event, lamp_edges, lanes
         Names from there too.
     majorant_scale
         Multiplies every bound of the density, for experiments. A factor below 1 is only for techniques and
@@ -225,8 +226,8 @@ def plan(scene: Scene, **choices: Any) -> Plan:
     ----------
     scene : from `load_file` or `load_dict`.
     choices : technique, transmittance, majorant, lookup, absorption, roulette, gathering, background,
-        probability, control, sampler, shadow_cache, light_choice, next_event, lanes, majorant_scale, step,
-        target_error, aov, as for `render`.
+        probability, control, sampler, shadow_cache, light_choice, next_event, lamp_edges, lanes,
+        majorant_scale, step, target_error, aov, as for `render`.
 
     Returns
     -------

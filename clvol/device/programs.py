@@ -40,6 +40,12 @@ SHARED = {
     "CLVOL_PHASES_HEADER": "layout, kinds of phase function",
 }
 """Slots of generated text, and what messages call it."""
+_LAMP_MACROS = {
+    "CLVOL_LAMP_GRID": layout.LAMP_GRID,
+    "CLVOL_LAMP_NONE": layout.LAMP_NONE,
+    "CLVOL_LAMP_UNSURE": layout.LAMP_UNSURE,
+}
+"""Of the kernel that looks for lamps alone."""
 _MACRO = re.compile(r"CLVOL_\w+")
 BUILD_OPTIONS = ("-cl-std=CL1.2", "-w")
 """No relaxed-math flag: they may delete the checks for NaN and infinity (METHODS §7).  -w: compilers
@@ -117,6 +123,11 @@ def stage_source(plan: Plan, stage: str) -> str:
 def light_cache_source(plan: Plan) -> str:
     """The composed source of the kernels that fill the cache of lights."""
     return compose(plan, '#include "kernels/light_cache.cl"\n')
+
+
+def lamp_edges_source(plan: Plan) -> str:
+    """The composed source of the kernel that finds the pixels that edges of lamps pass."""
+    return compose(plan, '#include "kernels/lamp_edges.cl"\n', _LAMP_MACROS)
 
 
 def arguments_of(source: str) -> list[str]:

@@ -63,6 +63,7 @@ ARGUMENTS = (
     Argument("textures", "__global const Texture *", "CLVOL_HAS_TEXTURES"),
     Argument("texels", "__global const float *", "CLVOL_HAS_BITMAPS"),
     Argument("material_tables", "__global const float *", "CLVOL_HAS_MATERIAL_TABLES"),
+    Argument("lamp_edges", "__global const uchar *", "CLVOL_LAMP_EDGES", rare=True),  # of each pixel
     Argument("light_faces", "__global const uint *", "CLVOL_HAS_AREA_MESH"),
     Argument("light_cdf", "__global const float *", "CLVOL_HAS_AREA_MESH"),
     Argument("envmap", "__global const Envmap *", "CLVOL_HAS_ENVMAP"),

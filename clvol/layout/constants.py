@@ -37,6 +37,11 @@ RANDOMIZATIONS = 4
 MOST_WEIGHED_LIGHTS = 16
 """Lights, the strongest, that the choice among lights tells apart by what they bring to a point."""
 
+LAMP_GRID = 2
+"""Points per pixel, along an axis, at which lamps are looked for that the camera sees."""
+LAMP_NONE, LAMP_UNSURE = 0, 255
+"""What may be there instead of the number of a lamp (cl/kernels/lamp_edges.cl)."""
+
 FLIGHT_STRATA = 8
 """Points of an exact flight at which emission is gathered, if at several; a power of two."""
 

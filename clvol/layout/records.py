@@ -92,7 +92,8 @@ EMITTER = _record(
     ("value", "f", 3),  # radiance, irradiance or intensity
     ("vector", "f", 3),  # direction of travel, axis of a spot or projector, an area light's mean normal
     ("position", "f", 3),  # of a point of light, or an area light's middle; up where a horizon cuts a sun
-    ("cutoff_angle", "f", 1),  # of a spot, radians; of a projector: `projector_frame` in clvol/tables
+    ("cutoff_angle", "f", 1),  # of a spot, radians; of a projector: `projector_frame` in clvol/tables;
+    # of an area light: 1 where it outshines what may be seen beside it (clvol/tables/lamp_edges.py), else 0
     ("beam_width", "f", 1),  # as that; of an area light with a texture: 1 + its number
     ("shape", "i", 1),  # of an area light
     ("area", "f", 1),  # or the solid angle of a sun, or of a projector: `projector_frame`

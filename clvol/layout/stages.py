@@ -183,8 +183,8 @@ STAGES = (
                 events=("ESCAPE", "SURFACE"),
             ),
         ),
-        reads=_fields(_RAY, _PASSED, "bounce inside hit_t"),
-        writes=_fields(_HIT, "inside origin medium_end"),
+        reads=_fields(_RAY, _KEY, _PASSED, "inside hit_t channel radiance"),
+        writes=_fields(_HIT, "inside origin medium_end radiance"),
     ),
     Stage(
         "medium_sample",

@@ -49,6 +49,7 @@ def resolve(
         "shadow_cache": ("on", "shadow rays that would bring next to nothing are rarely traced"),
         "light_choice": ("contribution", "each light as often as it matters at the point"),
         "next_event": ("control", "the noise of a phase function's peak is less"),
+        "lamp_edges": ("refined", "the edge of a lamp is noise that some more camera rays take away"),
         "sampler": (DEFAULT_SAMPLER, _SAMPLERS[DEFAULT_SAMPLER]),
         "lanes": (UNSETTLED, "16 on processors, off on others"),
     }

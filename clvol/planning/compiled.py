@@ -124,6 +124,7 @@ def plan_macros(plan: Decisions) -> dict[str, int]:
         "CLVOL_MIS": int(plan.mis),
         "CLVOL_LIGHT_CACHE": int(plan.light_cache),
         "CLVOL_LIGHT_CHOICE": int(plan.light_choice),
+        "CLVOL_LAMP_EDGES": int(plan.lamp_edges),
         "CLVOL_DIRECTION_CONTROL": int(plan.direction_control),
         "CLVOL_ABSORPTION": layout.enum("ABSORPTION", plan.chosen["absorption"]),
         "CLVOL_ROULETTE": layout.enum("ROULETTE", plan.chosen["roulette"]),

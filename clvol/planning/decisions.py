@@ -133,6 +133,18 @@ class Decisions:
         return self.chosen["next_event"] == "control" and self.light_cache and self.features.peaked
 
     @property
+    def may_refine_lamp_edges(self) -> bool:
+        """A camera outside of all media may see lamps, by weights that are the same all over a pixel."""
+        f = self.features
+        unfit = f.hide_emitters or f.meter or f.camera_inside or f.signed_filter or f.shows_depth
+        return f.area and not unfit
+
+    @property
+    def lamp_edges(self) -> bool:
+        """Lamps that it sees directly have edges of less noise than a pixel's samples."""
+        return self.may_refine_lamp_edges and self.chosen["lamp_edges"] == "refined"
+
+    @property
     def mis(self) -> bool:
         """Both ways of finding a light are in use, so that they must be weighted."""
         f = self.features

@@ -41,6 +41,7 @@ def used_names(plan: Decisions) -> Names:
         "next_event": ("control" if plan.direction_control else "plain")
         if plan.nee and features.scattering
         else "none",
+        "lamp_edges": chosen["lamp_edges"] if plan.may_refine_lamp_edges else "none",
         "lanes": chosen["lanes"] if "" in against(plan).values() else "none",
     }
     return Names(used)
@@ -83,6 +84,7 @@ def reasons(plan: Decisions) -> dict[str, str]:
         "next_event": "a phase function by table or of flakes has no closed form for the control"
         if {"TABPHASE", "SGGX"} & {*features.phases} and used["next_event"] == "plain"
         else "no light is sampled in media",
+        "lamp_edges": _no_lamp_edges(plan),
         "lanes": "; ".join(dict.fromkeys(against(plan).values())) or "no walk goes from look-up to look-up",
     }
     found = {}
@@ -90,6 +92,20 @@ def reasons(plan: Decisions) -> dict[str, str]:
         meant = name == plan.chosen[family] and not (family == "majorant" and name == "none")
         found[family] = plan.reasons[family] if meant else without[family]
     return found
+
+
+def _no_lamp_edges(plan: Decisions) -> str:
+    """Why no edges of lamps are refined."""
+    f = plan.features
+    hurdles = {
+        "no surface is a lamp": not f.area,
+        "the camera sees through lamps": f.hide_emitters,
+        "the sensor has no picture to see edges in": f.meter,
+        "the camera may be inside a medium": f.camera_inside,
+        "the pixel filter has negative parts": f.signed_filter,
+        "the picture shows distances": f.shows_depth,
+    }
+    return next((reason for reason, holds in hurdles.items() if holds), "")
 
 
 def _instead(plan: Decisions, family: str, used: str) -> str:

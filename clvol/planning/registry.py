@@ -194,6 +194,10 @@ LIGHT_CHOICES = {
     "contribution": Choice("by what each light is expected to bring to the point, power and a uniform share"),
     "power": Choice("by the power of each light"),
 }
+LAMP_EDGES = {
+    "refined": Choice("many more camera rays than samples find how much of a lamp a pixel on its edge sees"),
+    "sampled": Choice("the samples alone do"),
+}
 NEXT_EVENTS = {
     "plain": Choice("light times phase function times transmittance"),
     "control": Choice("with a control variate of zero mean, that knows where the path goes on"),
@@ -220,6 +224,7 @@ FAMILIES = {
     "shadow_cache": SHADOW_CACHES,
     "light_choice": LIGHT_CHOICES,
     "next_event": NEXT_EVENTS,
+    "lamp_edges": LAMP_EDGES,
     "lanes": LANES,
 }
 FAMILY_PURPOSE = {
@@ -237,6 +242,7 @@ FAMILY_PURPOSE = {
     "shadow_cache": "Whether shadow rays and lights are chosen by a cache of transmittances.",
     "light_choice": "How next-event estimation picks a light.",
     "next_event": "How next-event estimation in media weighs its light.",
+    "lamp_edges": "How the edges of lamps that the camera sees are found.",
     "lanes": "How many paths a work-item walks at once.",
 }
 

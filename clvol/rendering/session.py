@@ -22,6 +22,7 @@ from clvol.planning.in_force import warnings
 from clvol.planning.plan import Plan
 from clvol.planning.settled import Tuning
 from clvol.rendering.bands import BandedWavefront
+from clvol.rendering.lamp_edges import lamp_edges_unit
 from clvol.rendering.light_cache import light_cache_unit
 from clvol.rendering.pool import Pool
 from clvol.rendering.profiler import Profiler, timed
@@ -32,6 +33,7 @@ from clvol.rendering.wavefront import Wavefront
 from clvol.scene.digest import scene_digest
 from clvol.tables.camera import camera_rays, reach_of
 from clvol.tables.colours import rgb
+from clvol.tables.lamp_edges import lamp_window
 from clvol.tables.light_cache import light_cache_record
 from clvol.tables.pixel_filter import FILTER_BINS
 from clvol.tables.prepare import PreparedScene, prepare
@@ -137,7 +139,8 @@ class Session:
         rows = rows_at_a_time(device.memory, plan, size, slots, sharing, bricks)
         with timed(profiler, "units"):
             grid = light_cache_record(prepared).tobytes() if plan.light_cache else b""
-            key = compiled(plan), groups, size[0] * rows, grid
+            lamps = lamp_window(prepared) if plan.lamp_edges else ()
+            key = compiled(plan), groups, size[0] * rows, grid, lamps
             stages, others = residence.made("units", key, lambda: _units(prepared, groups, size[0] * rows))
             units = StageUnits.of(device, stages, None if profiler or spp is None else spp * math.prod(size))
         with SideBuilds(device, [*units.now.values(), *others]) as builds:
@@ -250,8 +253,10 @@ class Session:
 
 
 def _units(prepared: PreparedScene, groups: int, pixels: int) -> tuple[dict[str, Unit], list[Unit]]:
-    """What is built: of each stage, and of the cache of lights."""
+    """What is built: of each stage, and of what is found out before the first wave."""
     others = [light_cache_unit(prepared)] if prepared.plan.light_cache else []
+    if prepared.plan.lamp_edges:
+        others.append(lamp_edges_unit(prepared))
     return stage_units(prepared.plan, groups, pixels), others
 
 

@@ -15,6 +15,7 @@ from clvol import layout
 from clvol.accel.skipping import marked_empty
 from clvol.layout import BRICK_SAMPLES
 from clvol.planning.lanes import lanes
+from clvol.rendering.lamp_edges import lamp_edge_buffer
 from clvol.rendering.light_cache import light_cache_buffers
 from clvol.rendering.residence import Residence, Same, compiled
 from clvol.scene import records
@@ -65,6 +66,15 @@ def upload_scene(
         grid = light_cache_record(prepared).tobytes(), rows(prepared)
         key = compiled(prepared.plan), grid, tuple(names), Same(*(buffers[name] for name in names))
         buffers |= there.made("light_cache", key, fill)
+    if "lamp_edges" in needed:
+        view = render.copy()
+        view["seed"] = 0
+        seen = {"render": device.memory.upload(view, "the camera"), **buffers}
+        names = sorted(name for name in buffers if name not in _NOT_OF_THE_CACHE)
+        of_view = compiled(prepared.plan), view.tobytes(), tuple(names), Same(*(buffers[n] for n in names))
+        buffers["lamp_edges"] = there.made(
+            "lamp_edges", of_view, lambda: lamp_edge_buffer(device, prepared, seen)
+        )
     return buffers
 
 

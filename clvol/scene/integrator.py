@@ -27,6 +27,7 @@ CHOICES = (
     "sampler",
     "shadow_cache",
     "light_choice",
+    "lamp_edges",
     "next_event",
     "lanes",
 )

@@ -290,6 +290,7 @@ def test_options_reach_render_unchanged(scene: str, tmp_path: Path, monkeypatch:
         "shadow_cache": "auto",
         "light_choice": "auto",
         "next_event": "auto",
+        "lamp_edges": "auto",
         "lanes": "auto",
         "majorant_scale": 1.25,
         "step": None,

@@ -47,6 +47,7 @@ CHOICES = {
     "shadow_cache": "off",
     "light_choice": "power",
     "next_event": "plain",
+    "lamp_edges": "sampled",
     "lanes": "8",
 }
 LIMITS = {

@@ -163,6 +163,13 @@ def everything():
     )
 
 
+def seen_lamp():
+    """A lamp in a cloud, a channel a path, before a camera whose pixels weigh all that they see alike."""
+    film = {"type": "hdrfilm", "width": 6, "height": 4, "rfilter": {"type": "box"}}
+    lamp = {"type": "rectangle", "emitter": {"type": "area"}}
+    return scene(sensor={**SENSOR, "film": film}, lamp=lamp, cloud=cube(cloud(COLOURED)))
+
+
 CASES = {
     "everything": (
         everything,
@@ -172,6 +179,7 @@ CASES = {
         lambda: scene(cloud=cube(cloud(COLOURED)), sky=SKY),
         {"technique": "delta", "transmittance": "ratio", "background": "expected"},
     ),
+    "a lamp that is seen": (seen_lamp, {}),
 }
 
 
