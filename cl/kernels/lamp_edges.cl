@@ -37,7 +37,7 @@ __kernel void lamp_edges(CLVOL_ARGUMENTS, __global uchar *seen, uint left, uint 
         const Surface surface = hit_surface(&scene, ray, &hit);
         __global const Emitter *lamp = refined_lamp(&scene, &surface, ray.d);
         const uint number = (uint)(lamp - scene.emitters);
-        if (lamp && guess_through(&scene, ray, hit.t, number) >= 0.0f)
+        if (lamp && guess_through(&scene, ray, hit.t, number).x >= 0.0f)
             found = 1u + number % (CLVOL_LAMP_UNSURE - 1u);
         else if (lamp || shows_lamps(&scene, &surface, ray.d))
             found = CLVOL_LAMP_UNSURE;

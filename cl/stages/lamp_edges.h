@@ -24,15 +24,28 @@
 #define LAMP_RAYS 16u /* of a sample in a pixel that an edge passes */
 #define LAMP_SEGMENT 1u /* tells their random numbers from those of the path's own ray */
 
-#define NOBODY_KNOWS (-1.0f)
+#define NOBODY_KNOWS ((float3)(-1.0f))
 
-/* About the transmittance from the camera to the lamp's point at t, in the channel that is attenuated least; or
-   NOBODY_KNOWS. */
-INLINE float guess_through(const Scene *scene, Ray ray, float t, uint lamp)
+#if CLVOL_LIGHT_CACHE
+/* Of the transmittance `least` in the channel that a medium attenuates least, those of its channels. */
+INLINE float3 coloured_through(float least, float3 sigma_t)
 {
-    float through = 1.0f;
+    const float thinnest = min_of(sigma_t.x, min_of(sigma_t.y, sigma_t.z));
+    if (CLVOL_DENSITY_CHANNELS == 1 && sigma_t.x == sigma_t.y && sigma_t.y == sigma_t.z)
+        return (float3)(least);
+    if (CLVOL_DENSITY_CHANNELS == 3 || !(thinnest > 0.0f))
+        return NOBODY_KNOWS;
+    return pow((float3)(least), sigma_t / thinnest);
+}
+#endif
+
+/* About the transmittance from the camera to the lamp's point at t, or NOBODY_KNOWS. */
+INLINE float3 guess_through(const Scene *scene, Ray ray, float t, uint lamp)
+{
+    float3 through = (float3)(1.0f);
 #if CLVOL_HAS_MEDIA
-    bool through_volumes = false;
+    uint volumes = 0;
+    float3 of_volume = (float3)(1.0f); /* sigma_t of the one that is passed */
     Inside inside;
     for (int w = 0; w < CLVOL_BOUNDARY_WORDS; ++w)
         inside.word[w] = 0;
@@ -41,17 +54,22 @@ INLINE float guess_through(const Scene *scene, Ray ray, float t, uint lamp)
         Span span;
         if (!medium_segment(scene, m, ray, &inside, 0.0f, t, &span))
             continue;
-        const float least = min_of(medium->sigma_t[0], min_of(medium->sigma_t[1], medium->sigma_t[2]));
-        if (is_homogeneous(medium))
-            through *= exp(-least * (span.end - span.start));
-        else
-            through_volumes = true;
+        const float3 sigma_t = load_vector(medium->sigma_t);
+        if (is_homogeneous(medium)) {
+            through *= exp(-(span.end - span.start) * sigma_t);
+        } else {
+            of_volume = sigma_t;
+            ++volumes;
+        }
     }
-    if (!through_volumes)
+    if (volumes == 0)
         return through;
 #if CLVOL_LIGHT_CACHE
-    if (weighed_row(scene, lamp) >= 0)
-        return through * cached_transmittance(scene, lamp, ray.o, ray.d, t);
+    if (volumes == 1 && weighed_row(scene, lamp) >= 0) {
+        const float least = cached_transmittance(scene, lamp, ray.o, ray.d, t);
+        const float3 coloured = coloured_through(least, of_volume);
+        return coloured.x < 0.0f ? NOBODY_KNOWS : through * coloured;
+    }
 #endif
     through = NOBODY_KNOWS;
 #endif
@@ -75,7 +93,9 @@ INLINE float3 lamp_ahead(const Scene *scene, Ray ray)
     __global const Emitter *lamp = refined_lamp(scene, &surface, ray.d);
     if (!lamp)
         return (float3)(0.0f);
-    const float through = max_of(guess_through(scene, ray, hit.t, (uint)(lamp - scene->emitters)), 0.0f);
+    const float3 through = guess_through(scene, ray, hit.t, (uint)(lamp - scene->emitters));
+    if (through.x < 0.0f)
+        return (float3)(0.0f);
 #if CLVOL_HAS_VOLUME_TEXTURES
     Scene there = *scene;
     there.texture_point = surface.p;

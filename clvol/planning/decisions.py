@@ -137,7 +137,7 @@ class Decisions:
         """A camera outside of all media may see lamps, by weights that are the same all over a pixel."""
         f = self.features
         unfit = f.hide_emitters or f.meter or f.camera_inside or f.signed_filter or f.shows_depth
-        return f.area and not unfit
+        return f.area and not (unfit or f.emission or f.glow)
 
     @property
     def lamp_edges(self) -> bool:

@@ -104,6 +104,7 @@ def _no_lamp_edges(plan: Decisions) -> str:
         "the camera may be inside a medium": f.camera_inside,
         "the pixel filter has negative parts": f.signed_filter,
         "the picture shows distances": f.shows_depth,
+        "media glow, which may be as bright as a lamp": f.emission or f.glow,
     }
     return next((reason for reason, holds in hurdles.items() if holds), "")
 

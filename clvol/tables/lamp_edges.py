@@ -23,20 +23,27 @@ OUTSHINES = 4.0
 Window = tuple[int, int, int, int]
 
 
-def outshining(emitters: np.ndarray) -> np.ndarray:
+def outshining(emitters: np.ndarray, sky: float = 0.0) -> np.ndarray:
     """Which EMITTER records are lamps far brighter than what is likely to be seen beside them, bool (n,).
+
+    sky : radiance that little of a map of the environment exceeds (`bright_sky`).
 
     Beside others an edge's own noise is small, and what refining takes it for would be the greater: with
     radiance c times the lamp's beside it, the noise goes from (1 - c)² to c² of the lamp's.
     """
     kinds = {name: emitters["kind"] == layout.enum("EMITTER", name) for name in layout.ENUMS["EMITTER"]}
     bright = emitters["value"].max(axis=1).astype(np.float64)
-    distant = bright[kinds["CONSTANT"] | kinds["ENVMAP"]].sum()
+    distant = bright[kinds["CONSTANT"]].sum() + sky
     distant += (bright[kinds["DIRECTIONAL"]].sum() + (bright * emitters["area"])[kinds["SUN"]].sum()) / np.pi
     brightest = bright[kinds["AREA"]].max(initial=0.0)
     least = max(OUTSHINES * distant, brightest / OUTSHINES)
     found: np.ndarray = kinds["AREA"] & (bright > 0) & (bright >= least)
     return found
+
+
+def bright_sky(radiance: np.ndarray) -> float:
+    """Of a map (rows, columns, channels), what a hundredth of it exceeds in its brightest channel."""
+    return float(np.quantile(radiance.max(axis=-1), 0.99))
 
 
 def lamp_window(prepared: PreparedScene) -> Window:
@@ -59,6 +66,8 @@ def lamp_window(prepared: PreparedScene) -> Window:
         box = np.array(shape_bounds(shape))
         corners = np.array([[box[k, axis] for axis, k in enumerate(ks)] for ks in product((0, 1), repeat=3)])
         x, y, depth = rays.place(corners - prepared.centre)
+        if (depth <= 0).all():
+            continue
         if not (depth > 0).all() or not np.isfinite([x, y]).all():
             return 0, 0, width, height
         places.append((x.min(), y.min(), x.max(), y.max()))

@@ -16,7 +16,7 @@ from clvol.scene.primitives import QUADRICS
 from clvol.tables.affine import rotation_3x4
 from clvol.tables.colours import luminance, mean_luminance, rgb
 from clvol.tables.environment import envmap_distribution
-from clvol.tables.lamp_edges import outshining
+from clvol.tables.lamp_edges import bright_sky, outshining
 from clvol.tables.textures import lamp_textures, mean_radiance, projector_frame, slide
 
 if TYPE_CHECKING:
@@ -99,7 +99,8 @@ def light_table(
                 table[i]["beam_width"] = 1 + pictures.index(emission)
     order, chosen = _order(table["kind"], power)
     table, power = table[order], power[order]
-    table["cutoff_angle"][outshining(table)] = 1.0
+    maps = [bright_sky(e.radiance) for e in emitters if isinstance(e, records.EnvmapEmitter)]
+    table["cutoff_angle"][outshining(table, sum(maps))] = 1.0
     among = table[:chosen]
     among["select_pdf"], among["cdf"] = selection(power[:chosen], uniform)
     of_shape = np.full(len(shapes), -1, np.int32)

@@ -16,7 +16,14 @@ from tiers import quick_where
 import clvol
 from clvol.rendering import lamp_edges
 from clvol.scene.materials import Diffuse, Mask
-from clvol.scene.records import ConstantEmitter, DirectionalEmitter, ReconstructionFilter, Shape
+from clvol.scene.records import (
+    ConstantEmitter,
+    ConstVolume,
+    DirectionalEmitter,
+    EnvmapEmitter,
+    ReconstructionFilter,
+    Shape,
+)
 
 BLACK, WHITE = Diffuse((0.0,)), Diffuse((0.8,))
 RADIANCE = 5.0
@@ -204,12 +211,49 @@ def test_edges_through_smoke_lose_their_noise():
     assert noise["sampled"][part == 0].mean() < 1.2 * noise["refined"][part == 0].mean()
 
 
-@pytest.mark.parametrize("sky", ["none", "bright", "sun"])
+COLOURS = (0.05, 1.0, 3.0)
+COLOURED = {
+    "homogeneous": homogeneous(COLOURS, 0.3),
+    "grid": replace(
+        gridded(volume(np.ones((4, 4, 4)), (-2.0, -2.0, -2.0), (2.0, 2.0, -0.5)), 0.3), scale=COLOURS
+    ),
+    "coloured grid": gridded(
+        volume(np.full((4, 4, 4, 3), COLOURS), (-2.0, -2.0, -2.0), (2.0, 2.0, -0.5)), 0.3
+    ),
+}
+
+
+@pytest.mark.parametrize("medium", COLOURED)
+def test_no_channel_gets_noise_that_it_had_not(medium):
+    """Where one is absorbed far more than another, the guess of the transmittance is that of each."""
+    fog = box((-2.0, -2.0, -2.0), (2.0, 2.0, -0.5), COLOURED[medium])
+    scene = seen([plate(), WALL, fog], size=(12, 12), max_depth=6)
+    noise = {}
+    for edges in ("refined", "sampled"):
+        images = [
+            clvol.render(scene, spp=16, seed=s, sampler="joint", lamp_edges=edges).image for s in range(12)
+        ]
+        noise[edges] = np.var(images, axis=0, ddof=1).mean((0, 1))
+    assert (noise["refined"] < 1.3 * noise["sampled"]).all()
+
+
+def test_media_that_glow_may_be_as_bright_as_lamps():
+    glowing = replace(homogeneous(0.5, 0.0), emission=ConstVolume((9.0,)))
+    fog = box((-2.0, -2.0, -2.0), (2.0, 2.0, -0.5), glowing)
+    assert clvol.plan(seen([plate(), fog])).in_force["lamp_edges"] == "none"
+
+
+BAND = np.full((16, 32, 3), 0.1, np.float32)
+BAND[6:10] = RADIANCE
+
+
+@pytest.mark.parametrize("sky", ["none", "bright", "sun", "map"])
 def test_lamps_that_do_not_outshine_are_left_alone(sky):
     """Before a sky of their radiance a lamp's edge has no noise, and refining it would make some."""
     lights = {
         "none": (),
         "bright": (ConstantEmitter((RADIANCE,)),),
+        "map": (EnvmapEmitter(BAND, np.eye(4)),),
         "sun": (DirectionalEmitter((3 * RADIANCE,), (0.0, 0.0, 1.0)),),
     }[sky]
     pictures = [
