@@ -46,7 +46,6 @@ INLINE float filter_offset(const Scene *scene, uint k, int pixel, int pixels, fl
 #endif
 }
 
-#if !CLVOL_HAS_METER
 /* The camera ray of film position (x, y); u and v place it on the lens, uniformly over its disk. */
 INLINE Ray camera_ray(const Scene *scene, float x, float y, float u, float v)
 {
@@ -71,6 +70,5 @@ INLINE float camera_reach(const Scene *scene, float3 direction)
 {
     return scene->render->camera_far / dot_of(direction, load_vector(scene->render->camera_forward));
 }
-#endif
 
 #endif

@@ -40,12 +40,10 @@ SHARED = {
     "CLVOL_PHASES_HEADER": "layout, kinds of phase function",
 }
 """Slots of generated text, and what messages call it."""
-_LAMP_MACROS = {
-    "CLVOL_LAMP_GRID": layout.LAMP_GRID,
-    "CLVOL_LAMP_NONE": layout.LAMP_NONE,
-    "CLVOL_LAMP_UNSURE": layout.LAMP_UNSURE,
-}
-"""Of the kernel that looks for lamps alone."""
+_LAMPS = "".join(
+    f"#define {name} {getattr(layout, name)}u\n" for name in ("LAMP_GRID", "LAMP_NONE", "LAMP_UNSURE")
+)
+"""Numbers that the kernel alone has which looks for lamps."""
 _MACRO = re.compile(r"CLVOL_\w+")
 BUILD_OPTIONS = ("-cl-std=CL1.2", "-w")
 """No relaxed-math flag: they may delete the checks for NaN and infinity (METHODS §7).  -w: compilers
@@ -127,7 +125,7 @@ def light_cache_source(plan: Plan) -> str:
 
 def lamp_edges_source(plan: Plan) -> str:
     """The composed source of the kernel that finds the pixels that edges of lamps pass."""
-    return compose(plan, '#include "kernels/lamp_edges.cl"\n', _LAMP_MACROS)
+    return compose(plan, f'{_LAMPS}#include "kernels/lamp_edges.cl"\n')
 
 
 def arguments_of(source: str) -> list[str]:
