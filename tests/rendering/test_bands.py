@@ -324,6 +324,7 @@ def test_a_first_round_that_does_not_end_is_no_picture(device, held, monkeypatch
         opened(device).run(0, 100, None, lambda: 2)
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_keeps_whole_rounds(held):
     held(3)
     result = clvol.render(
