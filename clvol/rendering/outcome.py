@@ -140,7 +140,7 @@ def _efficiency(
     The device keeps no clock for a pixel: the seconds of the stages that walk are dealt out by look-ups and
     cells crossed, the others by samples.
     """
-    film, seconds = session.wavefront.film, session.wavefront.seconds
+    film, seconds = session.wavefront.film, session.wavefront.launched.seconds
     walking = sum(seconds.get(stage, 0.0) for stage in ("medium_sample", "shadow_transmittance"))
     work = sum((sums[name] for name in ("lookups", "cells") if name in sums), np.zeros(film.pixels))
     even = samples / samples.sum()
@@ -192,13 +192,13 @@ def statistics(session: Session, samples: int) -> dict[str, Any]:
             "setup": session.setup_seconds,
             "kernels": session.kernel_seconds,
             "render": session.seconds,
-            **wavefront.seconds,
+            **wavefront.launched.seconds,
         },
         "items": wavefront.handled.by_stage(session.plan.stages),
         "uploaded_bytes": session.uploaded,
         "kernels_built": session.built,
-        "launches": wavefront.launches,
-        "waves": wavefront.waves,
+        "launches": wavefront.launched.launches,
+        "waves": wavefront.launched.waves,
         "slots": wavefront.pool.slots,
         "bytes_per_slot": 4 * len(wavefront.fields),
         "non_finite": wavefront.non_finite(),

@@ -79,27 +79,29 @@ class Profiler:
         values = self.plan.channels + of_path * self.plan.jobs_per_sample
         self.kernels[ACCUMULATE] = KernelProfile(item_bytes=_WORD * values)
 
-    def before_wave(self, counters: cl.Buffer) -> None:
+    def before_waves(self, counters: cl.Buffer) -> None:
+        """Have the queues' counters read before the first of several waves."""
+        self._snapshots.clear()
+        self.after_wave(counters)
+
+    def after_wave(self, counters: cl.Buffer) -> None:
         """Have the queues' counters read once what is queued has run."""
         words = np.empty(counters.size // _WORD, np.uint32)
         event = cl.enqueue_copy(self.device.queue, words, counters, is_blocking=False)
         self._snapshots.append((event, words.reshape(-1, layout.QUEUE_LENGTHS_STRIDE)))
 
-    def waves(self, counters: cl.Buffer, stages: Sequence[str], launched: list[list[cl.Event]]) -> None:
-        """Book waves that have run; each was told of before it was launched."""
-        self.before_wave(counters)  # what the last of them left
-        self._snapshots[-1][0].wait()
-        before = self._snapshots[0][1]
-        for events, (copy, after) in zip(launched, self._snapshots[1:], strict=True):
-            items = (after[:, layout.HANDLED] - before[:, layout.HANDLED]).sum(axis=0, dtype=np.int64)
-            idle = int(before[:, len(layout.QUEUES)].sum())
-            slots = len(before) * self.plan.tuning.group_slots
-            self.in_flight.append((self._time(events[0].profile.start), slots - idle))
-            for stage, event in zip(stages, events, strict=True):
-                self.launched(stage, event, int(items[_PLACE[stage]]))
-            self.copied(copy, after.nbytes)
-            before = after
-        self._snapshots.clear()
+    def wave(self, stages: Sequence[str], launched: Sequence[cl.Event]) -> None:
+        """Book a wave that has run, the first of those told of."""
+        (_, before), (copy, after) = self._snapshots[:2]
+        del self._snapshots[0]
+        copy.wait()
+        items = (after[:, layout.HANDLED] - before[:, layout.HANDLED]).sum(axis=0, dtype=np.int64)
+        idle = int(before[:, len(layout.QUEUES)].sum())
+        slots = len(before) * self.plan.tuning.group_slots
+        self.in_flight.append((self._time(launched[0].profile.start), slots - idle))
+        for stage, event in zip(stages, launched, strict=True):
+            self.launched(stage, event, int(items[_PLACE[stage]]))
+        self.copied(copy, after.nbytes)
 
     def launched(self, name: str, event: cl.Event, items: int) -> None:
         """Book a launch that has run."""

@@ -18,9 +18,10 @@ import numpy as np
 import pyopencl as cl
 
 from clvol import layout
-from clvol.device.launch import launch, scene_arguments, set_arguments
+from clvol.device.launch import scene_arguments, set_arguments
 from clvol.rendering.film import Film
 from clvol.rendering.handled import Handled
+from clvol.rendering.launches import BATCH_SECONDS, Launches
 from clvol.rendering.patience import Patience
 from clvol.rendering.profiler import timed
 from clvol.rendering.sizes import stride, wave_sizes
@@ -38,8 +39,6 @@ _NEXT_JOB, _JOB_LIMIT, _NON_FINITE, _DONE = (layout.enum("COUNTER", n) for n in 
 _MAX_ROUND_JOBS = 1 << 31
 _HARVEST_SECONDS = 2.0
 """Statistics of the slots are collected at least this often: their 32-bit counters must not run over."""
-_BATCH_SECONDS = 0.02
-"""Waves are launched in batches of about this length; between batches the host reads the counters."""
 
 
 class Wavefront:
@@ -84,10 +83,9 @@ class Wavefront:
         self.film = self.new_film((low, high))
         self._harvested = time.perf_counter()
         self.stride = stride(pool.slots)
-        self.seconds = dict.fromkeys((*plan.stages, "accumulate"), 0.0)
-        self.launches = self.waves = 0
         self.handled = Handled(self.groups)
         self._allocate(buffers)
+        self.launched = Launches(device, plan, self.groups, self.buffers, profiler)
         self._use(kernels)
 
     def _allocate(self, scene_buffers: dict[str, cl.Buffer]) -> None:
@@ -130,11 +128,8 @@ class Wavefront:
         self.film = film
 
     def _reset_clocks(self) -> None:
-        self.seconds = dict.fromkeys(self.seconds, 0.0)
-        self.launches = self.waves = 0
+        self.launched.clear()
         self.handled.clear()
-        if self.profiler:
-            self.profiler.forget()
 
     def _buffer(self, size: int) -> cl.Buffer:
         return self.device.memory.allocate(size, f"a film of {self.pixels} pixels", "render fewer pixels")
@@ -209,22 +204,26 @@ class Wavefront:
         samples[-1] = count - (passes - 1) * self.pass_samples
         pass_jobs = self.pass_samples * self.sample_jobs
         self._start_round(first, pass_jobs, passes - 1, samples[-1])
-        begun = finished = 0
+        begun = finished = allowed = 0
         waves = 1
         idle = False
         try:
-            while True:
+            while not idle:
                 urgency = should_stop() if begun else 0
+                if urgency:  # what is queued may have begun more
+                    begun = self._begun(allowed, pass_jobs, self._read_counters())
+                    if idle := finished == begun:
+                        return
                 allowed = begun if urgency else min(passes, finished + self.ring_passes)
                 self._allow(sum(samples[:allowed]) * self.sample_jobs)
                 with timed(self.profiler, "waves"):
-                    launched, elapsed, counters = self._launch(waves)
-                if others := self._when_slow(sum(self.seconds.values())):
+                    launched, elapsed, counters = self.launched.batch(self.kernels, waves, not urgency)
+                if others := self._when_slow(sum(self.launched.seconds.values())):
                     self._use(others)
-                waves = int(np.clip(launched * _BATCH_SECONDS / max(elapsed, 1e-6), 1, max(2 * launched, 4)))
+                waves = int(np.clip(launched * BATCH_SECONDS / max(elapsed, 1e-6), 1, max(2 * launched, 4)))
                 if time.perf_counter() - self._harvested > _HARVEST_SECONDS:
                     self._harvest()
-                begun = min(allowed, -(-int(counters[_NEXT_JOB]) // pass_jobs))
+                begun = self._begun(allowed, pass_jobs, counters)
                 while finished < begun:
                     place = finished % self.ring_passes
                     if counters[_DONE + place] != samples[finished] * self.sample_jobs:
@@ -232,20 +231,26 @@ class Wavefront:
                     self._accumulate(place, samples[finished], first + finished * self.pass_samples)
                     finished += 1
                     yield sum(samples[:finished])
-                idle = finished == passes or bool(finished == begun and begun and should_stop())
-                if idle:
-                    return
-                if self._patience.ends(urgency, finished > 0 or earlier):
+                idle = finished == passes
+                if not idle and self._patience.ends(urgency, finished > 0 or earlier):
                     if urgency <= 2:
                         log.warning("dropped %d unfinished passes, whose paths did not end", begun - finished)
                     return
         finally:
-            if not idle:
+            if idle:
+                self.launched.settle()
+            else:
                 with suppress(cl.Error):  # a device that is lost has no paths
                     self._abandon()
 
+    @staticmethod
+    def _begun(most: int, pass_jobs: int, counters: np.ndarray) -> int:
+        """How many passes have begun, by the counters, of as many as were allowed."""
+        return min(most, -(-int(counters[_NEXT_JOB]) // pass_jobs))
+
     def _abandon(self) -> None:
         """Give up the paths in flight, and with them the passes that they belong to."""
+        self.launched.settle()
         fresh = {"job": layout.NO_JOB, "leg": 0, "shadow_leg": 0}
         for row, field in enumerate(self.fields):
             if field.name in fresh:
@@ -258,8 +263,9 @@ class Wavefront:
         Some drivers (PoCL) compile at the first launch, which is part of setting up and not of the render.
         """
         self._start_round(0, self.pass_samples * self.sample_jobs, 0, self.pass_samples)
-        self._launch(1)
+        self.launched.batch(self.kernels, 1, ahead=False)
         self._accumulate(0, 0, 0)
+        self.launched.settle()
         self._reset_clocks()
 
     def _start_round(self, first: int, pass_jobs: int, last_pass: int, last_samples: int) -> None:
@@ -280,41 +286,6 @@ class Wavefront:
         if jobs != self._allowed:
             self._allowed = jobs
             self._set_counter(_JOB_LIMIT, jobs)
-
-    def _launch(self, waves: int) -> tuple[int, float, np.ndarray]:
-        """Run up to `waves` waves: how many, the seconds they took, booked by stage, and the counters.
-
-        One wave is queued behind the one that runs, so that a batch that turns out long can be cut.  The
-        device is waited for as seldom as can be: each time it rests for a third of a millisecond.
-        """
-        local = self.plan.tuning.local_size
-        launched: list[list[cl.Event]] = []
-        start = time.perf_counter()
-        while len(launched) < waves:
-            if self.profiler:
-                self.profiler.before_wave(self.buffers["queue_lengths"])
-            launched.append(
-                [
-                    launch(self.device, self.kernels[stage], self.groups * local, local)
-                    for stage in self.plan.stages
-                ]
-            )
-            if len(launched) > 1:
-                launched[-2][-1].wait()
-                if time.perf_counter() - start > 2 * _BATCH_SECONDS:
-                    break
-        counters = self._read_counters()
-        self.launches += len(launched) * len(self.plan.stages)
-        self.waves += len(launched)
-        if self.profiler:
-            self.profiler.waves(self.buffers["queue_lengths"], self.plan.stages, launched)
-        total = 0.0
-        for events in launched:
-            for stage, event in zip(self.plan.stages, events, strict=True):
-                seconds = 1e-9 * (event.profile.end - event.profile.start)
-                self.seconds[stage] += seconds
-                total += seconds
-        return len(launched), total, counters
 
     def _set_counter(self, number: int, value: int) -> None:
         """Set a counter once what is queued has run, without waiting for it."""
@@ -343,13 +314,8 @@ class Wavefront:
             np.uint32(first),
             np.uint32(self.listed),
         )
-        event = launch(self.device, kernel, self.listed)
+        self.launched.accumulate(kernel, self.listed, samples)
         self._set_counter(_DONE + ring_pass, 0)
-        event.wait()
-        self.launches += 1
-        self.seconds["accumulate"] += 1e-9 * (event.profile.end - event.profile.start)
-        if self.profiler:
-            self.profiler.launched("accumulate", event, samples * self.listed)
 
     def slot_statistics(self) -> dict[str, float]:
         """Statistics that slots keep for themselves, combined over the slots."""
@@ -359,9 +325,9 @@ class Wavefront:
     def spent(self) -> dict[str, Any]:
         """What the samples so far took, and what slots counted: numbers for a checkpoint."""
         return {
-            "stages": dict(self.seconds),
-            "launches": self.launches,
-            "waves": self.waves,
+            "stages": dict(self.launched.seconds),
+            "launches": self.launched.launches,
+            "waves": self.launched.waves,
             "non_finite": self.non_finite(),
             "slots": self.slot_statistics(),
         }
@@ -369,8 +335,8 @@ class Wavefront:
     def take_up(self, film: dict[str, np.ndarray], spent: Mapping[str, Any]) -> None:
         """Go on where another wavefront was: with its film's buffers, and what it had `spent`."""
         stages, slots = spent["stages"], spent["slots"]
-        self.seconds = {stage: float(stages[stage]) for stage in self.seconds}
-        self.launches, self.waves = int(spent["launches"]), int(spent["waves"])
+        self.launched.seconds = {stage: float(stages[stage]) for stage in self.launched.seconds}
+        self.launched.launches, self.launched.waves = int(spent["launches"]), int(spent["waves"])
         self.film.slot_totals = {name: float(slots[name]) for name in self.film.slot_totals}
         self._set_counter(_NON_FINITE, int(spent["non_finite"]))
         self.film.put_back(film)

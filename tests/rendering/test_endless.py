@@ -91,7 +91,7 @@ def test_the_host_is_asked_after_a_bounded_number_of_steps(device, kind):
     before, most = [0, 0], [0.0]
 
     def ask():
-        after = [runs.slot_statistics()["tentative"], runs.waves]
+        after = [runs.slot_statistics()["tentative"], runs.launched.waves]
         waves = after[1] - before[1]
         if waves:
             most[0] = max(most[0], (after[0] - before[0]) / waves)
@@ -135,14 +135,14 @@ sys.path[:0] = {path!r}
 signal.signal(signal.SIGINT, signal.default_int_handler)
 import clvol
 from long_walks import endless
-from clvol.rendering.wavefront import Wavefront
-launch, calls = Wavefront._launch, []
-def counted(self, waves):
+from clvol.rendering.launches import Launches
+batch, calls = Launches.batch, []
+def counted(self, kernels, waves, ahead):
     calls.append(waves)
     if len(calls) in (4, 6):
         os.kill(os.getpid(), signal.SIGINT)
-    return launch(self, waves)
-Wavefront._launch = counted
+    return batch(self, kernels, waves, ahead)
+Launches.batch = counted
 try:
     clvol.render(endless("majorant"), majorant_scale=3e7)
 except KeyboardInterrupt:
