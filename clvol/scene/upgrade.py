@@ -18,6 +18,8 @@ from clvol.scene.spectra import srgb_to_linear
 from clvol.scene.xml_tree import Element
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from clvol.scene.faults import Faults
 
 _HEX = re.compile(r"#" + 3 * "([0-9a-fA-F]{2})")
@@ -77,6 +79,12 @@ def _plugin(element: Element, faults: Faults) -> Element:
     if kind == "film":
         children = [child for child in children if not child.attributes.get("name", "").startswith(ON_FILMS)]
     children = [child for child in children if not _is_not_heeded(child, (kind, name), faults)]
+    textured = [
+        child.attributes["name"]
+        for child in children
+        if child.tag == "texture" and "name" in child.attributes
+    ]
+    children = [child for child in children if child.tag == "texture" or not _named(child, textured)]
     given = {child.attributes.get("name") for child in children}
     for tag, parameter, value in rule.added:
         if parameter not in given and not given.intersection(rule.unless):
@@ -90,6 +98,10 @@ def _plugin(element: Element, faults: Faults) -> Element:
         return _sky(made)
     if kind == "texture":
         return _decoded(_texture(made), faults)
+    if name == "mfilm" and not any(child.tag == "rfilter" for child in children):
+        return replace(
+            made, children=[*children, Element("rfilter", {"type": "box"}, element.where, old=True)]
+        )
     return _grid(made) if name == "gridvolume" else made
 
 
@@ -221,5 +233,5 @@ def _has(element: Element, name: str) -> bool:
     return any(_named(child, (name,)) for child in element.children)
 
 
-def _named(element: Element, names: tuple[str, ...]) -> bool:
+def _named(element: Element, names: Sequence[str]) -> bool:
     return element.attributes.get("name") in names

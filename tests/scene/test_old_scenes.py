@@ -81,6 +81,27 @@ def test_a_whole_old_scene_is_a_new_one():
     assert len(before.approximated) == 3  # the integrator, the sampler and the film
 
 
+def test_a_film_of_matrices_has_one_pixel_and_no_filter():
+    """By the documentation of 0.6's `mfilm`: width and height are 1, and the filter is a box."""
+    sensor = '<sensor type="{}"><film type="{}">{}</film></sensor>'
+    before = old(sensor=sensor.format("radiancemeter", "mfilm", '<string name="fileFormat" value="numpy"/>'))
+    assert (before.film.width, before.film.height, before.film.rfilter.kind) == (1, 1, "box")
+    size = '<integer name="width" value="6"/><integer name="height" value="3"/><rfilter type="tent"/>'
+    before = old(sensor=sensor.format("perspective", "mfilm", size))
+    after = new(sensor=sensor.format("perspective", "hdrfilm", size))
+    assert same(before, after)
+
+
+def test_a_texture_stands_for_the_value_of_its_name():
+    """As 0.6 has it: the value is read first, and the texture takes its place."""
+    texture = '<texture name="reflectance" type="checkerboard"/>'
+    both = f'<shape type="sphere"><bsdf type="diffuse">{{}}{texture}</bsdf></shape>'
+    value = '<spectrum name="reflectance" value="0.5"/>'
+    assert same(old(both.format(value)), old(both.format("")))
+    with pytest.raises(clvol.SceneError, match="given twice"):
+        new(both.format('<rgb name="reflectance" value="0.5"/>'))
+
+
 def test_a_view_without_up_is_mitsubas():
     """Its matrix is what Mitsuba 3.9.1 prints."""
     view = '<sensor type="perspective"><transform name="to_world"><lookat origin="0,0,20" target="0,0,0"/>'
