@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from clvol.scene import records
+from clvol.scene.digest import alike, scene_digest
 from clvol.scene.extents import CLOSED, bounds_of, is_piece, openness, shape_bounds
 from clvol.scene.materials import Null
 
@@ -87,44 +89,64 @@ class Boundaries:
 
 def find_boundaries(scene: records.Scene) -> Boundaries:
     """Sort a scene's shapes into surfaces, spans and boundaries; a pure function of the records."""
-    shapes = scene.shapes
-    divides = [shape.interior is not shape.exterior for shape in shapes]
-    pairs = [(s.interior, s.exterior) for s, does in zip(shapes, divides, strict=True) if does]
+    shapes, one = scene.shapes, _one_of_each(scene)
+    sides = [(one.get(id(s.interior)), one.get(id(s.exterior))) for s in shapes]
+    divides = [inside is not outside for inside, outside in sides]
+    pairs = [media for media, does in zip(sides, divides, strict=True) if does]
     exteriors = {id(outside) for _, outside in pairs if outside is not None}
     holders = Counter(id(inside) for inside, _ in pairs if inside is not None)
     entries: list[MediumEntry] = []
     entry_of: dict[int, int] = {}  # of media that boundaries name
     surfaces, dividing = [], []
-    for index, shape in enumerate(shapes):
-        if shape.interior is not None and _is_interval(shape, exteriors, holders):
-            if id(shape.interior) in exteriors:
-                entry_of[id(shape.interior)] = len(entries)
-            entries.append(MediumEntry(shape.interior, shape))
+    for index, (shape, (inside, outside)) in enumerate(zip(shapes, sides, strict=True)):
+        counted = id(inside) in exteriors and holders[id(inside)] > 1  # what several hold and others keep out
+        if inside is not None and outside is None and not counted and _is_interval(shape):
+            if id(inside) in exteriors:
+                entry_of[id(inside)] = len(entries)
+            entries.append(MediumEntry(inside, shape))
             continue
         if divides[index]:
             dividing.append(index)
         if divides[index] or shape.emission is not None or not isinstance(shape.bsdf, Null):
             surfaces.append(index)
     for index in dividing:
-        shape = shapes[index]
-        for medium in (shape.interior, shape.exterior):
+        for medium in sides[index]:
             if medium is not None and id(medium) not in entry_of:
                 entry_of[id(medium)] = len(entries)
                 entries.append(MediumEntry(medium, None, id(medium) not in holders))
     known = {id(entry.medium) for entry in entries}
-    around = [shape.interior for shape, does in zip(shapes, divides, strict=True) if not does]
-    for medium in (*around, scene.camera.medium):
+    around = [inside for (inside, _), does in zip(sides, divides, strict=True) if not does]
+    for medium in (*around, one.get(id(scene.camera.medium))):
         if medium is not None and id(medium) not in known:
             known.add(id(medium))
             entries.append(MediumEntry(medium, None, True))
-    sides = {
-        index: tuple(
-            -1 if m is None else entry_of[id(m)] for m in (shapes[index].interior, shapes[index].exterior)
-        )
-        for index in dividing
-    }
-    boundaries = tuple(Boundary(tuple(parts), *sides[parts[0]]) for parts in _surfaces_of(shapes, sides))
+    numbers = {index: tuple(-1 if m is None else entry_of[id(m)] for m in sides[index]) for index in dividing}
+    boundaries = tuple(Boundary(tuple(parts), *numbers[parts[0]]) for parts in _surfaces_of(shapes, numbers))
     return Boundaries(tuple(surfaces), tuple(entries), boundaries)
+
+
+def _one_of_each(scene: records.Scene) -> dict[int, records.Medium]:
+    """By `id` of each medium, the first of those that are alike: what each shape says of the same air, say.
+
+    Only media that something names from outside, the others of which are there as often as they are held.
+    """
+    named = [medium for shape in scene.shapes for medium in (shape.interior, shape.exterior)]
+    media = {id(medium): medium for medium in (*named, scene.camera.medium) if medium is not None}
+    outer = {id(shape.exterior) for shape in scene.shapes} | {id(scene.camera.medium)}
+    if len(media) < 2 or not outer & media.keys():
+        return media
+    found: dict[str, list[list[records.Medium]]] = {}
+    for medium in media.values():
+        groups = found.setdefault(scene_digest(medium), [])
+        group = next((group for group in groups if alike(group[0], medium)), None)
+        if group is None:
+            groups.append([medium])
+        else:
+            group.append(medium)
+    for group in chain.from_iterable(found.values()):
+        if any(id(medium) in outer for medium in group):
+            media |= dict.fromkeys(map(id, group), group[0])
+    return media
 
 
 def _surfaces_of(shapes: Sequence[records.Shape], sides: dict[int, tuple[int, ...]]) -> Iterable[list[int]]:
@@ -137,19 +159,13 @@ def _surfaces_of(shapes: Sequence[records.Shape], sides: dict[int, tuple[int, ..
     return surfaces.values()
 
 
-def _is_interval(shape: records.Shape, exteriors: set[int], holders: Counter[int]) -> bool:
-    """Whether the shape only holds a medium, in a span of any ray.
-
-    What several shapes hold and others keep out has to be counted.
-    """
+def _is_interval(shape: records.Shape) -> bool:
+    """Whether what the shape holds, if it does no more, is in one span of any ray."""
     return (
         shape.kind in CONVEX
         and isinstance(shape.bsdf, Null)
         and shape.emission is None
-        and shape.interior is not None
-        and shape.exterior is None
         and not shape.flip_normals
-        and not (id(shape.interior) in exteriors and holders[id(shape.interior)] > 1)
     )
 
 

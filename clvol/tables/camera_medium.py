@@ -14,6 +14,7 @@ import numpy as np
 from clvol.errors import SceneError
 from clvol.scene import records
 from clvol.scene.boundaries import Boundaries, is_clipped
+from clvol.scene.digest import alike
 from clvol.scene.primitives import mesh_of
 from clvol.tables.camera import camera_rays
 from clvol.volumes.grid import SparseGrid
@@ -77,7 +78,7 @@ def _check_far_light(scene: records.Scene, medium: records.Medium) -> None:
         return
     what = f"no light of '{names[0]}' gets through medium{_quoted(medium)}, which has no end"
     hint = "bound it by a shape round everything: its interior, with a null BSDF"
-    if medium is scene.camera.medium:
+    if alike(medium, scene.camera.medium):
         raise SceneError(f"{what}: the sensor is in it, and no shape holds it", scene.source, hint)
     log.warning("%s: it is only ever the exterior of shapes; %s", what, hint)
 
@@ -110,7 +111,7 @@ def _surrounds(scene: records.Scene, found: Boundaries, medium: records.Medium) 
     towards = rays.base + pixels[:, :1] * rays.base_dx + pixels[:, 1:] * rays.base_dy
     presence = np.zeros(len(pixels), int)
     for number, entry in enumerate(found.entries):
-        if entry.medium is not medium:
+        if not alike(entry.medium, medium):
             continue
         presence += int(entry.everywhere)
         if entry.shape is not None:
