@@ -7,7 +7,7 @@ rest meanwhile: one wave more is queued behind what the host reads, and runs whi
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pyopencl as cl
@@ -19,10 +19,18 @@ if TYPE_CHECKING:
 
     from clvol.device.device import Device
     from clvol.planning.plan import Plan
-    from clvol.rendering.profiler import Profiler
+    from clvol.rendering.profiler import Profiler, Snapshot
 
 BATCH_SECONDS = 0.02
 """Waves are launched in batches of about this length; between batches the host reads the counters."""
+
+
+class Wave(NamedTuple):
+    """The launches of all stages, and for a profiler the queues before and after them."""
+
+    launches: list[cl.Event]
+    before: Snapshot | None = None
+    after: Snapshot | None = None
 
 
 class Launches:
@@ -50,7 +58,7 @@ class Launches:
     ) -> None:
         self._device, self._plan, self._groups, self._buffers = device, plan, groups, buffers
         self._profiler = profiler
-        self._waves: list[list[cl.Event]] = []
+        self._waves: list[Wave] = []
         self._passes: list[tuple[cl.Event, int]] = []
         self.clear()
 
@@ -96,19 +104,26 @@ class Launches:
             self._book_wave()
         self._book_passes()
 
+    def forget(self) -> None:
+        """Book nothing of what is queued."""
+        self._waves, self._passes = [], []
+
     def accumulate(self, kernel: cl.Kernel, pixels: int, samples: int) -> None:
         """Add a pass to the film, whose arguments the kernel has: so many samples of so many pixels."""
         self._passes.append((launch(self._device, kernel, pixels), samples * pixels))
 
     def _queue_wave(self, kernels: Mapping[str, cl.Kernel]) -> None:
-        local, profiler = self._plan.tuning.local_size, self._profiler
-        if profiler and not self._waves:
-            profiler.before_waves(self._buffers["queue_lengths"])
-        self._waves.append(
-            [launch(self._device, kernels[stage], self._groups * local, local) for stage in self._plan.stages]
-        )
+        local, profiler, before, after = self._plan.tuning.local_size, self._profiler, None, None
         if profiler:
-            profiler.after_wave(self._buffers["queue_lengths"])
+            before = (
+                self._waves[-1].after if self._waves else profiler.snapshot(self._buffers["queue_lengths"])
+            )
+        launches = [
+            launch(self._device, kernels[stage], self._groups * local, local) for stage in self._plan.stages
+        ]
+        if profiler:
+            after = profiler.snapshot(self._buffers["queue_lengths"])
+        self._waves.append(Wave(launches, before, after))
 
     def _counters(self) -> tuple[np.ndarray, cl.Event]:
         """What the counters are once what is queued has run."""
@@ -118,12 +133,12 @@ class Launches:
 
     def _book_wave(self) -> float:
         """Wait for the first wave that is queued, and count it: its seconds."""
-        events, stages = self._waves.pop(0), self._plan.stages
-        events[-1].wait()
+        wave, stages = self._waves.pop(0), self._plan.stages
+        wave.launches[-1].wait()
         self.waves += 1
-        if self._profiler:
-            self._profiler.wave(stages, events)
-        return sum(self._took(stage, event) for stage, event in zip(stages, events, strict=True))
+        if self._profiler and wave.before and wave.after:
+            self._profiler.wave(stages, wave.launches, wave.before, wave.after)
+        return sum(self._took(stage, event) for stage, event in zip(stages, wave.launches, strict=True))
 
     def _book_passes(self) -> None:
         """Wait until the passes that are queued are in the film, and count them."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from contextlib import contextmanager, nullcontext
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pyopencl as cl
@@ -32,6 +32,13 @@ _WORD = 4
 _PLACE = {stage.name: place for place, stage in enumerate(layout.STAGES)}
 
 
+class Snapshot(NamedTuple):
+    """The queues' counters, once they are copied; uint32 (groups, QUEUE_LENGTHS_STRIDE)."""
+
+    copy: cl.Event
+    counters: np.ndarray
+
+
 def timed(profiler: Profiler | None, name: str) -> AbstractContextManager[None]:
     """A step of the host, which a profiler is told of if there is one."""
     return profiler.step(name) if profiler else nullcontext()
@@ -47,7 +54,6 @@ class Profiler:
         self.in_flight: list[tuple[int, int]] = []
         self.left_out = 0
         self._cpu = 0.0
-        self._snapshots: list[tuple[cl.Event, np.ndarray]] = []
 
     @contextmanager
     def step(self, name: str) -> Iterator[None]:
@@ -79,21 +85,17 @@ class Profiler:
         values = self.plan.channels + of_path * self.plan.jobs_per_sample
         self.kernels[ACCUMULATE] = KernelProfile(item_bytes=_WORD * values)
 
-    def before_waves(self, counters: cl.Buffer) -> None:
-        """Have the queues' counters read before the first of several waves."""
-        self._snapshots.clear()
-        self.after_wave(counters)
-
-    def after_wave(self, counters: cl.Buffer) -> None:
+    def snapshot(self, counters: cl.Buffer) -> Snapshot:
         """Have the queues' counters read once what is queued has run."""
         words = np.empty(counters.size // _WORD, np.uint32)
         event = cl.enqueue_copy(self.device.queue, words, counters, is_blocking=False)
-        self._snapshots.append((event, words.reshape(-1, layout.QUEUE_LENGTHS_STRIDE)))
+        return Snapshot(event, words.reshape(-1, layout.QUEUE_LENGTHS_STRIDE))
 
-    def wave(self, stages: Sequence[str], launched: Sequence[cl.Event]) -> None:
-        """Book a wave that has run, the first of those told of."""
-        (_, before), (copy, after) = self._snapshots[:2]
-        del self._snapshots[0]
+    def wave(
+        self, stages: Sequence[str], launched: Sequence[cl.Event], earlier: Snapshot, later: Snapshot
+    ) -> None:
+        """Book a wave that has run, between two snapshots."""
+        (copy, after), before = later, earlier.counters
         copy.wait()
         items = (after[:, layout.HANDLED] - before[:, layout.HANDLED]).sum(axis=0, dtype=np.int64)
         idle = int(before[:, len(layout.QUEUES)].sum())

@@ -231,7 +231,7 @@ class Wavefront:
                     self._accumulate(place, samples[finished], first + finished * self.pass_samples)
                     finished += 1
                     yield sum(samples[:finished])
-                idle = finished == passes
+                idle = finished == passes or bool(urgency and finished == begun)
                 if not idle and self._patience.ends(urgency, finished > 0 or earlier):
                     if urgency <= 2:
                         log.warning("dropped %d unfinished passes, whose paths did not end", begun - finished)
@@ -250,12 +250,15 @@ class Wavefront:
 
     def _abandon(self) -> None:
         """Give up the paths in flight, and with them the passes that they belong to."""
-        self.launched.settle()
-        fresh = {"job": layout.NO_JOB, "leg": 0, "shadow_leg": 0}
-        for row, field in enumerate(self.fields):
-            if field.name in fresh:
-                values = np.full(self.stride, fresh[field.name], np.uint32)
-                self._write("state", values, values.nbytes * row)
+        try:
+            self.launched.settle()
+        finally:
+            self.launched.forget()
+            fresh = {"job": layout.NO_JOB, "leg": 0, "shadow_leg": 0}
+            for row, field in enumerate(self.fields):
+                if field.name in fresh:
+                    values = np.full(self.stride, fresh[field.name], np.uint32)
+                    self._write("state", values, values.nbytes * row)
 
     def warm_up(self) -> None:
         """Run every kernel once with nothing to do.
@@ -324,12 +327,13 @@ class Wavefront:
 
     def spent(self) -> dict[str, Any]:
         """What the samples so far took, and what slots counted: numbers for a checkpoint."""
+        slots = self.slot_statistics()
         return {
             "stages": dict(self.launched.seconds),
             "launches": self.launched.launches,
             "waves": self.launched.waves,
             "non_finite": self.non_finite(),
-            "slots": self.slot_statistics(),
+            "slots": slots,
         }
 
     def take_up(self, film: dict[str, np.ndarray], spent: Mapping[str, Any]) -> None:
@@ -342,7 +346,8 @@ class Wavefront:
         self.film.put_back(film)
 
     def _harvest(self) -> None:
-        """Collect what the slots have counted since the last time, and let them begin anew."""
+        """Collect what has run, and what the slots have counted since the last time; they begin anew."""
+        self.launched.settle()
         rows = {f.name: n for n, f in enumerate(self.fields)}
         zeros = np.zeros(self.stride, np.uint32)
         totals = self.film.slot_totals

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clvol.scene import records
-from clvol.scene.digest import alike, scene_digest
+from clvol.scene.digest import alike, outline
 from clvol.scene.extents import CLOSED, bounds_of, is_piece, openness, shape_bounds
 from clvol.scene.materials import Null
 
@@ -137,7 +137,7 @@ def _one_of_each(scene: records.Scene) -> dict[int, records.Medium]:
         return media
     found: dict[str, list[list[records.Medium]]] = {}
     for medium in media.values():
-        groups = found.setdefault(scene_digest(medium), [])
+        groups = found.setdefault(outline(medium), [])
         group = next((group for group in groups if alike(group[0], medium)), None)
         if group is None:
             groups.append([medium])

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 _HEX = re.compile(r"#" + 3 * "([0-9a-fA-F]{2})")
 _NUMBERS = re.compile(r"\s*\d{0,9}\.?\d{1,30}(?:[\s,]+\d{0,9}\.?\d{1,30}){0,2}\s*", re.ASCII)
 MEDIA = ("interior", "exterior")
+_TEXTURES = ("texture", "ref")
+"""Elements that stand in the place of a value of their name."""
 
 
 def snake_case(name: str) -> str:
@@ -79,12 +81,8 @@ def _plugin(element: Element, faults: Faults) -> Element:
     if kind == "film":
         children = [child for child in children if not child.attributes.get("name", "").startswith(ON_FILMS)]
     children = [child for child in children if not _is_not_heeded(child, (kind, name), faults)]
-    textured = [
-        child.attributes["name"]
-        for child in children
-        if child.tag == "texture" and "name" in child.attributes
-    ]
-    children = [child for child in children if child.tag == "texture" or not _named(child, textured)]
+    textured = [child.attributes.get("name") for child in children if child.tag in _TEXTURES]
+    children = [child for child in children if child.tag in _TEXTURES or not _named(child, textured)]
     given = {child.attributes.get("name") for child in children}
     for tag, parameter, value in rule.added:
         if parameter not in given and not given.intersection(rule.unless):
@@ -98,7 +96,7 @@ def _plugin(element: Element, faults: Faults) -> Element:
         return _sky(made)
     if kind == "texture":
         return _decoded(_texture(made), faults)
-    if name == "mfilm" and not any(child.tag == "rfilter" for child in children):
+    if name == "mfilm" and not any(child.tag in ("rfilter", "ref") for child in children):
         return replace(
             made, children=[*children, Element("rfilter", {"type": "box"}, element.where, old=True)]
         )
@@ -233,5 +231,6 @@ def _has(element: Element, name: str) -> bool:
     return any(_named(child, (name,)) for child in element.children)
 
 
-def _named(element: Element, names: Sequence[str]) -> bool:
-    return element.attributes.get("name") in names
+def _named(element: Element, names: Sequence[str | None]) -> bool:
+    """Whether its name is one of these; elements without a name have none."""
+    return "name" in element.attributes and element.attributes["name"] in names

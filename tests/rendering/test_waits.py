@@ -1,24 +1,30 @@
 """How often the host waits for the device, and that the device does not rest meanwhile."""
 
 import math
+from contextlib import suppress
 from itertools import product
 
 import numpy as np
 import pyopencl as cl
+import pytest
 from every_bit import scene
 
+import clvol
 from clvol import layout
 from clvol.planning.choices import Choices
+from clvol.planning.plan import Plan
 from clvol.rendering import launches, wavefront
 from clvol.rendering.launches import Launches
 from clvol.rendering.outcome import make_result
+from clvol.rendering.profiler import Profiler
 from clvol.rendering.session import Session
 
 
-def session_of(device, monkeypatch):
+def session_of(device, monkeypatch, profiler=None):
     monkeypatch.setattr(wavefront, "_HARVEST_SECONDS", math.inf)
     monkeypatch.setattr(launches, "BATCH_SECONDS", 1e-4)
-    return Session.for_scene(device, scene(), Choices(majorant="grid"), seed=1, pool=256)
+    plan = Plan.of(scene(), Choices(majorant="grid"))
+    return Session.for_plan(device, scene(), plan, seed=1, pool=256, profiler=profiler)
 
 
 def test_a_wave_is_queued_behind_what_the_host_waits_for(device, monkeypatch):
@@ -77,3 +83,57 @@ def test_an_end_finishes_the_passes_that_waves_ahead_have_begun(device, monkeypa
         session.run(0, spp)
         assert (make_result(session, 0, spp).image == image).all()
     assert len(ends) > 8
+
+
+@pytest.mark.parametrize("profiled", [False, True])
+def test_a_device_that_fails_leaves_no_path_to_the_next_render(device, monkeypatch, profiled):
+    """Two waits in a row fail, also the one for what is queued: slots begin anew, nothing is booked twice."""
+    profiler = Profiler() if profiled else None
+    session = session_of(device, monkeypatch, profiler)
+    session.wavefront.pass_samples = 4
+    session.run(0, 64)
+    expected = make_result(session, 0, 64).image
+    wait, left, kernel = cl.Event.wait, [0], session.wavefront.kernels["accumulate"]
+
+    def failing(event):
+        left[0] -= 1
+        if left[0] in (0, -1):
+            cl.enqueue_nd_range_kernel(
+                device.queue, kernel, (0,) * 5, (1,) * 5
+            )  # raises an error of OpenCL's
+        return wait(event)
+
+    for at in (1, 2, 7, 12):
+        session.restart(1)
+        left[0] = at
+        monkeypatch.setattr(cl.Event, "wait", failing)
+        with pytest.raises(clvol.DeviceError):
+            session.run(0, 64)
+        monkeypatch.setattr(cl.Event, "wait", wait)
+        session.restart(1)
+        session.run(0, 64)
+        assert (make_result(session, 0, 64).image == expected).all()
+        assert not session.wavefront.launched._waves
+
+
+def test_what_is_shown_of_a_render_has_been_counted(device, monkeypatch):
+    """A frame's statistics hold the passes that are in its picture, and every wave."""
+    session = session_of(device, monkeypatch)
+    session.wavefront.pass_samples = 4
+    launched, stages = session.wavefront.launched, len(session.plan.stages)
+    for done in session.passes(0, 64, None, lambda: 0):
+        stats = make_result(session, 0, done).stats
+        assert stats["launches"] == launched.waves * stages + done // 4
+        assert stats["seconds"]["accumulate"] > 0
+        assert not launched._waves
+
+
+def test_an_end_that_drops_nothing_warns_of_nothing(device, monkeypatch, caplog):
+    session = session_of(device, monkeypatch)
+    session.wavefront.pass_samples = 16
+    for asked_after in range(1, 40):
+        asked = iter(range(asked_after))
+        session.restart(1)
+        with suppress(KeyboardInterrupt):  # before a pass was finished
+            session.run(0, 1 << 20, None, lambda asked=asked: 2 * (next(asked, None) is None))
+    assert "dropped 0" not in caplog.text

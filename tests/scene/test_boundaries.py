@@ -89,6 +89,13 @@ def test_clouds_that_are_alike_add_where_they_overlap():
     assert len(find_boundaries(scene).entries) == 2
 
 
+def test_alike_is_to_the_last_bit():
+    """As fingerprints tell: 0 and -0 differ, and a value that is none does not from itself."""
+    assert not alike(homogeneous(1.0, 0.0), homogeneous(1.0, -0.0))
+    assert not alike(np.array([0.0]), np.array([-0.0])) and alike(np.array([np.nan]), np.array([np.nan]))
+    assert not alike(np.zeros(2, np.float32), np.zeros(2)) and not alike((1.0,), (1.0, 1.0))
+
+
 @pytest.mark.parametrize("edge", [4, 130])
 def test_grids_are_alike_to_the_last_sample(edge):
     """Also where fingerprints look at some samples only."""

@@ -92,12 +92,22 @@ def test_a_film_of_matrices_has_one_pixel_and_no_filter():
     assert same(before, after)
 
 
+def test_a_film_of_matrices_takes_a_filter_by_its_name():
+    film = '<film type="mfilm"><ref id="f"/></film>'
+    film = f'<rfilter type="tent" id="f"/><sensor type="perspective">{film}</sensor>'
+    assert old(sensor=film).film.rfilter.kind == "tent"
+
+
 def test_a_texture_stands_for_the_value_of_its_name():
     """As 0.6 has it: the value is read first, and the texture takes its place."""
     texture = '<texture name="reflectance" type="checkerboard"/>'
     both = f'<shape type="sphere"><bsdf type="diffuse">{{}}{texture}</bsdf></shape>'
     value = '<spectrum name="reflectance" value="0.5"/>'
     assert same(old(both.format(value)), old(both.format("")))
+    named = texture.replace('name="reflectance"', 'id="t"')
+    bsdf = f'<bsdf type="diffuse">{value}<ref name="reflectance" id="t"/></bsdf>'
+    by_name = f'{named}<shape type="sphere">{bsdf}</shape>'
+    assert same(old(by_name), old(both.format("")))
     with pytest.raises(clvol.SceneError, match="given twice"):
         new(both.format('<rgb name="reflectance" value="0.5"/>'))
 
