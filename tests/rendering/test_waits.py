@@ -20,9 +20,10 @@ from clvol.rendering.profiler import Profiler
 from clvol.rendering.session import Session
 
 
-def session_of(device, monkeypatch, profiler=None):
+def session_of(device, monkeypatch, profiler=None, batch_seconds=1e-4):
     monkeypatch.setattr(wavefront, "_HARVEST_SECONDS", math.inf)
-    monkeypatch.setattr(launches, "BATCH_SECONDS", 1e-4)
+    for module in (launches, wavefront):
+        monkeypatch.setattr(module, "BATCH_SECONDS", batch_seconds)
     plan = Plan.of(scene(), Choices(majorant="grid"))
     return Session.for_plan(device, scene(), plan, seed=1, pool=256, profiler=profiler)
 
@@ -129,11 +130,12 @@ def test_what_is_shown_of_a_render_has_been_counted(device, monkeypatch):
 
 
 def test_an_end_that_drops_nothing_warns_of_nothing(device, monkeypatch, caplog):
-    session = session_of(device, monkeypatch)
+    """The batch in which it is asked for ends all that has begun."""
+    session = session_of(device, monkeypatch, batch_seconds=1.0)
     session.wavefront.pass_samples = 16
-    for asked_after in range(1, 40):
+    for asked_after in range(1, 10):
         asked = iter(range(asked_after))
         session.restart(1)
-        with suppress(KeyboardInterrupt):  # before a pass was finished
+        with suppress(KeyboardInterrupt):  # where none has ended yet
             session.run(0, 1 << 20, None, lambda asked=asked: 2 * (next(asked, None) is None))
     assert "dropped 0" not in caplog.text
