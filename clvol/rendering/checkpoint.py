@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("clvol")
 
-FORMAT = 1
+FORMAT = 2
 _ABOUT = "about"
 _ARCHIVE = b"PK\x03\x04"
 _HINT = "give another name, or remove the file to begin anew"
@@ -53,7 +53,7 @@ class Saved:
     first, done : samples of each pixel.
     pictures : names of those that the film makes beside the image.
     metadata : of the picture so far.
-    spent : seconds, launches and waves, and statistics of slots.
+    spent : seconds, launches and waves, what stages handled, and statistics of slots.
     buffers : of the film, uint8, by name.
     """
 

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from clvol import layout
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 
 class Handled:
@@ -35,3 +40,7 @@ class Handled:
         """Paths that each of these stages has handled."""
         handled = {s.name: int(n) for s, n in zip(layout.STAGES, self._total, strict=True)}
         return {stage: handled[stage] for stage in stages}
+
+    def take_up(self, by_stage: Mapping[str, int]) -> None:
+        """Go on from what had been handled, by stage."""
+        self._total = np.array([by_stage.get(s.name, 0) for s in layout.STAGES], np.uint64)

@@ -332,6 +332,7 @@ class Wavefront:
             "stages": dict(self.launched.seconds),
             "launches": self.launched.launches,
             "waves": self.launched.waves,
+            "items": self.handled.by_stage(self.plan.stages),
             "non_finite": self.non_finite(),
             "slots": slots,
         }
@@ -341,6 +342,7 @@ class Wavefront:
         stages, slots = spent["stages"], spent["slots"]
         self.launched.seconds = {stage: float(stages[stage]) for stage in self.launched.seconds}
         self.launched.launches, self.launched.waves = int(spent["launches"]), int(spent["waves"])
+        self.handled.take_up(spent["items"])
         self.film.slot_totals = {name: float(slots[name]) for name in self.film.slot_totals}
         self._set_counter(_NON_FINITE, int(spent["non_finite"]))
         self.film.put_back(film)

@@ -34,6 +34,7 @@ def same(one, other):
         "paths",
         "largest_sample",
         "non_finite",
+        "items",
     ):
         assert one.stats[name] == other.stats[name], name
 
