@@ -98,7 +98,7 @@ FOG = {
 }
 
 
-@pytest.mark.parametrize("kind", FOG)
+@quick_where("kind", FOG, {"grid"}.__contains__)
 def test_through_what_absorbs(kind):
     """A slab of 1.5 before the lamp, along the axis; more where a ray is slanted."""
     scene = seen([plate(), box((-2.0, -2.0, -2.0), (2.0, 2.0, -0.5), FOG[kind])])
@@ -143,7 +143,7 @@ BEFORE = {
 }  # fmt: skip
 
 
-@quick_where("lamp", LAMPS, {"square", "ball", "behind a mask"}.__contains__)
+@quick_where("lamp", LAMPS, {"square", "behind a mask"}.__contains__)
 def test_lamps_in_smoke_have_the_mean_that_samples_alone_find(lamp):
     scene = smoky(LAMPS[lamp], *BEFORE.get(lamp, ()))
     pictures = [
@@ -175,7 +175,7 @@ def test_every_technique_has_that_mean(choices):
     assert np.abs(z).max() < largest_z(z.size)
 
 
-@pytest.mark.parametrize("view", ["lens", "gaussian", "crop", "one channel a path"])
+@quick_where("view", ("lens", "gaussian", "crop", "one channel a path"), {"lens"}.__contains__)
 def test_cameras_and_films_have_that_mean(view):
     scene = smoky(plate(), albedo=(0.9, 0.5, 0.2) if view == "one channel a path" else 0.8)
     if view == "lens":
@@ -202,7 +202,7 @@ def test_edges_through_smoke_lose_their_noise():
     noise = {}
     for edges in ("refined", "sampled"):
         images = [
-            clvol.render(scene, spp=16, seed=s, sampler="joint", lamp_edges=edges).image for s in range(12)
+            clvol.render(scene, spp=16, seed=s, sampler="joint", lamp_edges=edges).image for s in range(6)
         ]
         noise[edges] = np.var(images, axis=0, ddof=1)[..., 0]
     part = coverage(scene, points=64)[..., 0]
@@ -223,7 +223,7 @@ COLOURED = {
 }
 
 
-@pytest.mark.parametrize("medium", COLOURED)
+@quick_where("medium", COLOURED, {"coloured grid"}.__contains__)
 def test_no_channel_gets_noise_that_it_had_not(medium):
     """Where one is absorbed far more than another, the guess of the transmittance is that of each."""
     fog = box((-2.0, -2.0, -2.0), (2.0, 2.0, -0.5), COLOURED[medium])
@@ -231,7 +231,7 @@ def test_no_channel_gets_noise_that_it_had_not(medium):
     noise = {}
     for edges in ("refined", "sampled"):
         images = [
-            clvol.render(scene, spp=16, seed=s, sampler="joint", lamp_edges=edges).image for s in range(12)
+            clvol.render(scene, spp=16, seed=s, sampler="joint", lamp_edges=edges).image for s in range(6)
         ]
         noise[edges] = np.var(images, axis=0, ddof=1).mean((0, 1))
     assert (noise["refined"] < 1.3 * noise["sampled"]).all()
