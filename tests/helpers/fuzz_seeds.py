@@ -23,7 +23,7 @@ import clvol
 from clvol.lab.comparison.reference import read_reference
 from clvol.picture.estimate import Moments
 from clvol.picture.result import Result
-from clvol.rendering.checkpoint import read_checkpoint
+from clvol.rendering.checkpoint import FORMAT, read_checkpoint
 from clvol.volumes.bricks import build_bricks
 from clvol.volumes.check import check_finite
 from clvol.volumes.listing import list_grids
@@ -194,8 +194,9 @@ def _results(_folder: Path) -> list[bytes]:
 
 
 def _checkpoints(_folder: Path) -> list[bytes]:
-    spent = {"seconds": 1.0, "stages": {}, "slots": {}, "launches": 1, "waves": 1, "non_finite": 0}
-    about = {"format": 1, "first": 0, "done": 4, "pictures": ["lookups"], "metadata": {}, "spent": spent}
+    spent = {"seconds": 1.0, "launches": 1, "waves": 1, "non_finite": 0}
+    spent |= {"stages": {}, "items": {}, "slots": {}}
+    about = {"format": FORMAT, "first": 0, "done": 4, "pictures": ["lookups"], "metadata": {}, "spent": spent}
     text = np.frombuffer(json.dumps(about).encode(), np.uint8)
     return [_bytes(np.savez, about=text, film=np.zeros(96, np.uint8), film_peaks=np.zeros(16, np.uint8))]
 
