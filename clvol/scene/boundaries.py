@@ -126,9 +126,9 @@ def find_boundaries(scene: records.Scene) -> Boundaries:
 
 
 def _one_of_each(scene: records.Scene) -> dict[int, records.Medium]:
-    """By `id` of each medium, the first of those that are alike: what each shape says of the same air, say.
+    """By `id` of each medium, the first of those alike: what a lamp and a ball say of the air they stand in.
 
-    Only media that something names from outside, the others of which are there as often as they are held.
+    Media that neither an exterior nor the sensor names stay as they are: clouds that are alike add.
     """
     named = [medium for shape in scene.shapes for medium in (shape.interior, shape.exterior)]
     media = {id(medium): medium for medium in (*named, scene.camera.medium) if medium is not None}
@@ -151,10 +151,10 @@ def _one_of_each(scene: records.Scene) -> dict[int, records.Medium]:
 
 def _surfaces_of(shapes: Sequence[records.Shape], sides: dict[int, tuple[int, ...]]) -> Iterable[list[int]]:
     """The shapes that divide media, by the surfaces that they make up, in the order of their first ones."""
-    alike = Counter(sides.values())
+    count = Counter(sides.values())
     surfaces: dict[object, list[int]] = {}  # of pieces by the media that they divide, else by their number
     for index, media in sides.items():
-        key = media if alike[media] > 1 and is_piece(shapes[index]) else index
+        key = media if count[media] > 1 and is_piece(shapes[index]) else index
         surfaces.setdefault(key, []).append(index)
     return surfaces.values()
 

@@ -1,4 +1,7 @@
-"""A short fingerprint of a scene, so that results of different scenes are not taken for one another."""
+"""Which scenes, and parts of them, are the same: by short fingerprints, and to the last bit.
+
+Fingerprints keep results of different scenes from being taken for one another.
+"""
 
 from __future__ import annotations
 
